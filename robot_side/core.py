@@ -2,7 +2,7 @@
 
 
 payloads ─▶ receive ─▶ newest command ─▶ safety ─▶ tool motion ─▶ arm
-arm ─▶ kinematics ─▶ law: contact ahead ─▶ stiffness fields, telemetry ─▶ payloads
+arm ─▶ kinematics ─▶ law: contact ahead ─▶ stiffness fields ─▶ payloads; then telemetry, and the camera's frame
 """
 
 import math
@@ -163,7 +163,8 @@ class RobotSide:
         sensed = parts.law.sense(situation, now_s)
         self.newest = sensed, situation
         begin("messages")
-        outgoing = self.reports.outgoing(permission, situation, state, sensed, (sight, grip, self.motion), now_s)
+        stands = grip.touchdown.stands
+        outgoing = self.reports.outgoing(permission, situation, sensed, self.motion, stands, now_s)
         holds_target = grip.index is not None and grip.index == sight.target
         found = permission, self.motion.commanded_rad_s, state, situation, sensed
         self._found = Found(*found, holds_target, sight.target_m)
@@ -185,12 +186,20 @@ class RobotSide:
         # In every tick, so that a link that falls silent ages, too (eq. 8).
         return loop_age.update(age_s + late_s, now_s)
 
-    def observe(self, now_s: float) -> None:
-        """Read the camera's newest frame, and let listeners work; call it after the tick's messages have left."""
+    def observe(self, now_s: float) -> list[Outgoing]:
+        """Return telemetry, read the camera's newest frame, and let listeners work.
+
+        To be called after the tick's messages have left.
+        """
         self._heard.on_step("frame")
+        seen: list[Outgoing] = []
+        if (found := self._found) is not None:
+            target = None if self.sight.target is None else found.situation.objects.names[self.sight.target]
+            seen = self.reports.telemetry(found, target, self.motion.hindrance, now_s)
         self.sight.see(now_s)
         self._heard.on_step("end")
         self._heard.on_sent(now_s)
+        return seen
 
     def status(self, now_s: float) -> RobotStatus:
         """Return the status shown to people, without the figures of the link, which `turns.py` adds."""

@@ -81,9 +81,9 @@ class RobotTurns:
         )
 
     def rest(self, now_s: float, turned_s: float) -> None:
-        """Do what may wait: views, recording, reports, keys, tuning; then let the core observe its frame."""
+        """Do what may wait: views, recording, reports, keys, tuning."""
         process = self._process
-        seen = self._looking.idle(now_s, turned_s)
+        seen = self._core.observe(turned_s) + self._looking.idle(now_s, turned_s)
         self._sending.push(seen, now_s)
         if process.recording is not None:
             for message in seen:
@@ -103,7 +103,6 @@ class RobotTurns:
             process.note(text)
         if (words := tuning.take_link()) is not None:
             self._sending.tune(words)
-        self._core.observe(turned_s)
 
     def _status(self, now_s: float) -> RobotStatus:
         return replace(self._core.status(now_s), **self._reporter.status())

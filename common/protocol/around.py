@@ -80,5 +80,5 @@ class Around(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields
 
     def differs(self, other: "Around") -> bool:
         """Return whether `full_s` differs at all, or any distance by more than one step."""
-        both = np.frombuffer(self.steps + other.steps, dtype=np.uint8).reshape(2, -1)
-        return self.full_s != other.full_s or int((both.max(axis=0) - both.min(axis=0)).max()) > 1
+        pairs = zip(self.steps, other.steps, strict=True)
+        return self.full_s != other.full_s or any(not -1 <= one - two <= 1 for one, two in pairs)

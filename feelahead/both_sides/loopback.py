@@ -169,10 +169,9 @@ class Loopback:
         start_s = _WALL.now()
         outgoing = self.robot.tick(now_s)
         self.tick_time.add(_WALL.now() - start_s)
-        for message in outgoing:
+        for message in outgoing + self.robot.observe(now_s):
             self._to_operator[message.stream].push(now_s, message.payload)
         if (words := self.robot.session.tuning.take_link()) is not None:
             self._back = tuned_link(self._back, words)
             for stream, line in self._to_operator.items():
                 line.change(self._back.profile("to_operator", stream))
-        self.robot.observe(now_s)

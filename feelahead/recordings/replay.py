@@ -99,7 +99,7 @@ def replay_robot(recording: Recording) -> Comparison:
             core.sight.see(entry.now_s)
         elif entry.kind == Kind.TICK:
             compared.missed(made)
-            made.extend(one.payload for one in core.tick(entry.now_s) if one.stream == "haptics")
+            made.extend(one.payload for one in core.tick(entry.now_s))
         elif entry.kind == Kind.SENT:
             payload = split_text(split_text(entry.content)[1])[1]
             compared.take(payload, made.popleft() if made else None)

@@ -162,12 +162,8 @@ class OperatorSession:
         return [self._receiver(one, now_s) for one in self.lease.observers()]
 
     def shown_header(self, now_s: float) -> Header:
-        """Return a header for a picture or the scene, which are made between ticks."""
+        """Return a header for a message to viewers, which is made between ticks."""
         return self._announcements.stamp_shown(now_s)
-
-    def view_header(self, now_s: float) -> Header:
-        """Return a header for a message to viewers."""
-        return self._announcements.stamp(now_s)
 
     def loop_age_s(self, now_s: float) -> float | None:
         """Return the loop age (eq. 8): age of our stamp that the newest accepted command echoes; None before the first.

@@ -19,7 +19,7 @@ from robot_side.recording.inputs import FramePacker, pack_state
 from robot_side.settings import RobotSettings
 from robot_side.surroundings.perceived import PerceivedObjects
 
-_HAPTICS: Final = "haptics"
+_HAPTICS: Final = b"haptics"
 
 
 class Recorder(Listener):
@@ -55,7 +55,8 @@ class RobotEncoder:
         self._state = self._frame = None
 
     def encode(self, noted: Any, views: Callable[[float, bytes], None]) -> tuple[float, bytes]:
-        """Return the time of a note, and its entries; telemetry is given to `views`."""
+        """Return the time of a note, and its entries."""
+        del views  # recorded as they are sent (turns.py)
         if not isinstance(noted, Tick):
             kind, now_s, *content = noted
             parts = [msgspec.json.encode(*content)] if kind == Kind.EPISODE else [text(content[0]), content[1]]
@@ -70,10 +71,7 @@ class RobotEncoder:
             parts.append(entry(Kind.FRAME, now_s, self._frames.pack(frame)))
         parts.append(entry(Kind.TICK, now_s, struct.pack("<d", sent_s)))
         for message in outgoing:
-            if message.stream == _HAPTICS:
-                parts.append(entry(Kind.SENT, now_s, text(_HAPTICS.encode()), text(message.peer), message.payload))
-            else:
-                views(now_s, message.payload)
+            parts.append(entry(Kind.SENT, now_s, text(_HAPTICS), text(message.peer), message.payload))
         return now_s, b"".join(parts)
 
 

@@ -96,7 +96,8 @@ def telemetry(
     pose: GripperPose,
     sensed: Sensed,
     arm: ArmState,
-    target: tuple[str, FloatArray | None] | None,
+    target: str | None,
+    target_m: FloatArray | None,
     hindrance: Hindrance,
     frames: StickFrames | None,
     *,
@@ -105,18 +106,18 @@ def telemetry(
 ) -> Telemetry:
     """Return the telemetry for viewers; its header is filled in later.
 
-    target: the target's name, and its centre (3,) in metres, NaN if unknown. settled: whether the loop age is.
+    target: the target's name; target_m: its centre (3,), NaN if unknown. settled: whether the loop age is.
     """
     target_in_tool, tool = None, pose.tool_rotation
     faces = frames is not None and frames.camera.faces(tool)
-    if target is not None and target[1] is not None and np.isfinite(target[1]).all():
-        target_in_tool = (target[1] - pose.tool_position_m) @ pose.tool_rotation
+    if target is not None and target_m is not None and np.isfinite(target_m).all():
+        target_in_tool = (target_m - pose.tool_position_m) @ pose.tool_rotation
     return Telemetry(
         _NO_HEADER,
         state=state,
         tool_position_m=_vector3(pose.tool_position_m),
         tool_speed_m_s=min(sensed.tool_speed_m_s, _FASTEST_M_S),
-        target=None if target is None else target[0][:SHOWN_NAME],
+        target=None if target is None else target[:SHOWN_NAME],
         target_in_tool_m=None if target_in_tool is None else _vector3(target_in_tool),
         up_in_tool=_vector3(pose.tool_rotation[2]),
         gripper_opening_m=max(0.0, arm.gripper_opening_m),

@@ -1,4 +1,4 @@
-"""Messages of one tick: answers, stiffness for operators, and telemetry for viewers."""
+"""Messages of one tick: answers and stiffness for operators; and telemetry for viewers, after these have left."""
 
 from typing import Final
 
@@ -6,9 +6,9 @@ import msgspec
 import numpy as np
 
 from common.protocol.codec import encode
-from robot_side.arm.port import ArmState
+from robot_side.arm.hindrance import Hindrance
 from robot_side.arm.stick_frames import StickFrames
-from robot_side.gripper.grip import Grip
+from robot_side.events import Found
 from robot_side.laws.law import Law, Situation
 from robot_side.laws.sensed import Sensed
 from robot_side.motion import Motion
@@ -16,7 +16,6 @@ from robot_side.operators.operator_session import OperatorSession
 from robot_side.operators.safety import Permission
 from robot_side.reporting.outgoing_messages import MapSchedule, Outgoing, stiffness_message, telemetry
 from robot_side.reporting.perceptual_deadband import StiffnessDeadband, TelemetryDeadband
-from robot_side.surroundings.surroundings import Sight
 
 OBSERVER_PERIOD_S: Final = 0.02
 """Period of the stiffness messages to observers, in seconds"""
@@ -45,15 +44,14 @@ class Reports:
         self,
         permission: Permission,
         situation: Situation,
-        state: ArmState,
         sensed: Sensed,
-        parts: tuple[Sight, Grip, Motion],
+        motion: Motion,
+        stands: bool,
         now_s: float,
     ) -> list[Outgoing]:
-        """Return the messages that are due at `now_s`."""
-        session, (sight, grip, motion) = self._session, parts
-        hindrance = motion.hindrance
-        felt = sensed, motion.told_m_s, permission.state, grip.touchdown.stands, hindrance.text is not None
+        """Return the messages to operators that are due at `now_s`. stands: whether the held object is supported."""
+        session = self._session
+        felt = sensed, motion.told_m_s, permission.state, stands, motion.hindrance.text is not None
         outgoing = [Outgoing("haptics", *answer) for answer in session.take_answers(now_s)]
         if session.owner_peer is not None and self.felt.due(*felt, permission.command, now_s):
             self.stiffness_sent += 1
@@ -62,13 +60,17 @@ class Reports:
         if now_s >= self._next_observers_s:
             self._next_observers_s = now_s + OBSERVER_PERIOD_S
             outgoing += [stiffness_message(one, *felt) for one in session.observers(now_s)]
-        holding = grip.held is not None
-        if self._seen.may_be_due((session.lease.token, permission.state, sight.target, holding, hindrance.text), now_s):
-            target = None if sight.target is None else (situation.objects.names[sight.target], sight.target_m)
-            settled = situation.loop_age_settled
-            shown = permission.state, situation.pose, sensed, state, target, hindrance, self._frames
-            view = telemetry(*shown, holding=holding, settled=settled)
-            if self._seen.due(view, now_s):
-                view = msgspec.structs.replace(view, header=session.view_header(now_s))
-                outgoing.append(Outgoing("telemetry", b"", encode(view)))
         return outgoing
+
+    def telemetry(self, found: Found, target: str | None, hindrance: Hindrance, now_s: float) -> list[Outgoing]:
+        """Return the telemetry of a tick's results, if it is due at `now_s`. target: the target's name."""
+        state, situation = found.permission.state, found.situation
+        holding = situation.held is not None
+        if not self._seen.may_be_due((self._session.lease.token, state, target, holding, hindrance.text), now_s):
+            return []
+        shown = state, situation.pose, found.sensed, found.state, target, found.target_m, hindrance, self._frames
+        view = telemetry(*shown, holding=holding, settled=situation.loop_age_settled)
+        if not self._seen.due(view, now_s):
+            return []
+        view = msgspec.structs.replace(view, header=self._session.shown_header(now_s))
+        return [Outgoing("telemetry", b"", encode(view))]

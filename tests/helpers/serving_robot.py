@@ -66,7 +66,7 @@ class ServingRobot:
             for answer in self.session.take_answers(now_s):
                 self.sockets.send(answer.peer, answer.payload)
             if self._publishes:
-                self.sockets.publish(b"telemetry", encode(telemetry(self.session.view_header(now_s))))
+                self.sockets.publish(b"telemetry", encode(telemetry(self.session.shown_header(now_s))))
 
     def tick(self, now_s: float) -> None:
         """Do nothing; a test may override this method, which each turn of the thread calls."""

@@ -157,7 +157,7 @@ class Bench:
         """Tick `count` times, a millisecond each; the robot side's messages reach the operators at once."""
         for _ in range(count):
             self.ticks += 1
-            for outgoing in self.robot.tick(self.now_s):
+            for outgoing in self.robot.tick(self.now_s) + self.robot.observe(self.now_s):
                 message = decode(outgoing.payload)
                 if isinstance(message, Telemetry):
                     self.views.append(message)
@@ -165,7 +165,6 @@ class Bench:
                     message, MotionCommand | Watch | Tune | Mark | LinkReport
                 ):
                     operator.take(message, self.now_s)
-            self.robot.observe(self.now_s)
 
     def silence(self, duration_s: float) -> None:
         """Tick for `duration_s` without messages from operators."""
