@@ -2,7 +2,7 @@
 
 
 payloads ─▶ receive ─▶ newest command ─▶ safety ─▶ tool motion ─▶ arm
-arm ─▶ kinematics ─▶ law: contact ahead ─▶ stiffness fields ─▶ payloads; then telemetry, and the camera's frame
+arm ─▶ kinematics ─▶ law: contact ahead ─▶ stiffness fields ─▶ payloads; afterwards telemetry
 """
 
 import math

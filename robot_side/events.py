@@ -16,8 +16,8 @@ from robot_side.reporting.outgoing_messages import Outgoing
 from robot_side.surroundings.perceived import PerceivedObjects
 
 Step = Literal["arm", "pose", "grip", "motion", "law", "messages", "listeners", "frame", "end"]
-"""Steps of a turn, in their order. A simulated arm advances its physics in `arm`. `frame`, telemetry
-and the camera's frame, comes after the messages to operators have left. `end` means that no step runs until the next one begins."""
+"""Steps of a turn, in their order. A simulated arm advances its physics in `arm`. In `frame`, after the messages to
+operators have left, telemetry is made and the camera read. `end`: no step runs until the next one begins."""
 
 
 class Found(NamedTuple):
