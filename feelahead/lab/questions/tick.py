@@ -42,7 +42,7 @@ class TickSweep(Sweep):
 
     Each figure is shown with its ratio to "mixed", a fixed workload that takes turns with the ticks
     (feelahead/lab/tick); p50 is compared with p50, and p99 with p99. "look to message": from the arm's readings to the
-    sent messages, without physics. "without physics": the same, with telemetry and the camera's frame, which come afterwards.
+    sent messages, without physics. "without physics": with telemetry and the camera's frame, which come afterwards.
     "whole look": the law, in those ticks in which it evaluated a trigger.
     """
 
