@@ -261,7 +261,7 @@ class SimulatedOperator:
     def _lowering(self, look: Glance) -> None:
         """Lower the object until it is felt or seen to stand: gently after a cue and near the expected height.
 
-        If it sinks no more, though only a stiff trigger stops it, press that one harder step by step.
+        If it sinks no more because of a stiff trigger, press that alone, harder step by step.
         """
         if self._dropped(look):
             return
@@ -277,7 +277,8 @@ class SimulatedOperator:
         left_m = height_m - self._gripped_height_m + self._depth_error_m
         speed = max(min(_CARRY_M_S, look.gain * left_m), self._gently_m_s)
         x, y, z = (-speed * part for part in look.view.up_in_tool)
-        self._go((x, y, z), {Button.CROSS})
+        # A stick that goes on while the trigger is stopped would drag the object along the table.
+        self._go((0.0, 0.0, z) if stiff else (x, y, z), {Button.CROSS})
 
     def _letting_go(self, look: Glance) -> None:
         """Open the gripper, and rise a little, as the person has pressed the object down."""

@@ -14,6 +14,8 @@ from robot_side.drivers.mujoco.gripper_measurement import GripperTravel
 _BLOCKED_LAG = 0.02
 _STANDING_SPEED_1_S = 0.05
 _STANDING_TIME_S = 0.05
+# Fingers that hold something may follow its slip. If they close faster than this share of their free speed, it is gone.
+_LOST_SHARE = 0.5
 # Time constant of the measured speed: stiff fingers chatter on a gripped object.
 _SPEED_TIME_CONSTANT_S = 0.05
 # Opening below which the fingers have closed on nothing.
@@ -142,6 +144,8 @@ def advance_gripper(
         gripper.reference = min(max(moved, 0.0), 1.0)
 
     blocked = gripper.reference - free > min(_BLOCKED_LAG, 0.5 * gripper.force_lead)
-    standing = abs(gripper.speed) < _STANDING_SPEED_1_S
+    holds = gripper.standing_s >= _STANDING_TIME_S
+    follows = holds and gripper.speed * gripper.stroke_time_s < _LOST_SHARE
+    standing = abs(gripper.speed) < _STANDING_SPEED_1_S or follows
     stopped = blocked and standing and gripper.told_to_close == 1
     gripper.standing_s = gripper.standing_s + step_s if stopped else 0.0
