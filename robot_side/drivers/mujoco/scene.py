@@ -15,7 +15,7 @@ from common.errors import ConfigurationError
 from common.files.input_file import require_input_file
 from common.roles import Role
 from robot_side.arm.port import ArmState
-from robot_side.drivers.mujoco.brought.table import TABLE_PREFIX, attach, settle, usual_place
+from robot_side.drivers.mujoco.brought.table import TABLE_PREFIX, attach, keep_from_slipping, settle, usual_place
 from robot_side.drivers.mujoco.built_in_scenes import SceneName, furnish
 from robot_side.drivers.mujoco.model_enums import GeomKind
 from robot_side.drivers.mujoco.object_primitives import ObjectPrimitives, SceneObject
@@ -123,6 +123,7 @@ def load_scene(
             table = _read(_ASSETS / f"{name}_scene.xml")
             furnish(table, name, seed)
             if model_path is not None and name == "table":
+                keep_from_slipping(spec)
                 start, place, moved_m, found = settle(table, model, robot, start, may_search=model.nkey == 0)
                 start_pose = _FOUND_START if found else start_pose
                 if moved_m:

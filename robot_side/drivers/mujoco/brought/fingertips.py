@@ -15,8 +15,13 @@ _INSIDE_M: Final = 0.015
 """Distance of the tool from the ends of the fingertips, as in the built-in arm"""
 _AWAY_M: Final = 0.02
 """Distance up to which a site stays where it is: a person grasps as far past the tool's point"""
-_INTO_M: Final = 0.04
-"""Distance from the tool's point, into the hand, over which a grasped object needs room"""
+_NEAR_M: Final = 0.033
+"""Distance of the tool's point from a jaw that stands still while the other one closes: the other one pushes an object
+against it. The built-in target's half width fits, and 13 mm for errors"""
+_STILL_M: Final = 1e-3
+INTO_M: Final = 0.04
+LOW_INTO_M: Final = 0.01
+"""Distances from the tool's point, into the hand, over which a grasped object needs room: usually, and for a low one"""
 
 
 def move_site(model: Any, robot: RobotModel, start: FloatArray, travel: GripperTravel) -> float:
@@ -66,14 +71,14 @@ def room_m(corners_m: FloatArray, from_m: FloatArray, way: FloatArray, most_m: f
 
 
 def rooms_m(
-    model: Any, data: Any, robot: RobotModel, from_m: FloatArray, closing: FloatArray, most_m: float
+    model: Any, data: Any, robot: RobotModel, from_m: FloatArray, closing: FloatArray, most_m: float, into_m: float
 ) -> tuple[float, float]:
     """Return the room for a grasped object on either side of `from_m` (3,), at most `most_m`: against, along `closing`.
 
-    The object reaches into the hand.
+    The object reaches by `into_m` into the hand.
     """
     hand = placed_corners(model, data, robot.gripper_geoms)
-    into = -_INTO_M * data.site_xmat[robot.site].reshape(3, 3)[:, 2]
+    into = -into_m * data.site_xmat[robot.site].reshape(3, 3)[:, 2]
     return room_m(hand, from_m, -closing, most_m, into=into), room_m(hand, from_m, closing, most_m, into=into)
 
 
@@ -94,6 +99,21 @@ def _between(model: Any, data: Any, robot: RobotModel, travel: GripperTravel) ->
     mujoco.mj_geomDistance(model, data, *nearest_pair(model, data, robot, apart_m), 2.0 * apart_m, ends)
     across_m = float((ends.reshape(2, 3).mean(axis=0) - site_m) @ closing)
     middle_m = across_m * closing + (max(ends_m) - _INSIDE_M) * approach
-    left_m, right_m = rooms_m(model, data, robot, site_m + middle_m, closing, 0.5 * apart_m)
-    between_m: FloatArray = middle_m + 0.5 * (right_m - left_m) * closing
+    still = still_side(model, data, robot, travel)
+    reach_m = (0.5 * apart_m, INTO_M) if still == 0.0 else (apart_m, LOW_INTO_M)
+    left_m, right_m = rooms_m(model, data, robot, site_m + middle_m, closing, *reach_m)
+    aside_m = 0.5 * (right_m - left_m) if still == 0.0 else right_m - _NEAR_M if still > 0.0 else _NEAR_M - left_m
+    between_m: FloatArray = middle_m + aside_m * closing
     return between_m
+
+
+def still_side(model: Any, data: Any, robot: RobotModel, travel: GripperTravel) -> float:
+    """Return 1 or -1 if only the jaw ahead or behind along `closing_direction` stands still, else 0."""
+    closing, places_m = closing_direction(model, data, robot, travel), []
+    for fingers in (travel.closed_fingers, travel.open_fingers):
+        data.qpos[robot.finger_positions] = fingers
+        mujoco.mj_kinematics(model, data)
+        places_m.append(data.geom_xpos[robot.gripper_geoms] @ closing)
+    moved_m = np.subtract(*places_m)
+    ways = np.sign(moved_m[np.abs(moved_m) > _STILL_M])
+    return float(ways[0]) if ways.size > 0 and (ways == ways[0]).all() else 0.0

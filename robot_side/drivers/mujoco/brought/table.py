@@ -11,7 +11,14 @@ import numpy as np
 
 from common.arrays import FloatArray
 from common.errors import ConfigurationError
-from robot_side.drivers.mujoco.brought.fingertips import closing_direction, move_site, rooms_m
+from robot_side.drivers.mujoco.brought.fingertips import (
+    INTO_M,
+    LOW_INTO_M,
+    closing_direction,
+    move_site,
+    rooms_m,
+    still_side,
+)
 from robot_side.drivers.mujoco.brought.reach import FROM_ABOVE, NEAR_M, go, grasp_places
 from robot_side.drivers.mujoco.built_in_scenes import make_room
 from robot_side.drivers.mujoco.gripper_measurement import GripperTravel, measure_gripper
@@ -38,6 +45,10 @@ _SLIMMEST: Final = 4.0
 """Largest ratio of the target's height to its thickness, beyond the built-in one's"""
 _LOWEST_M: Final = 0.045
 """Least half height of the target: a hand from above grasps it 20 mm above its centre"""
+_LOW_M: Final = 0.03
+"""Half height of the target for a hand of which only one jaw moves: as that turns, it presses on a higher one's top"""
+_IMPRATIO: Final = 30.0
+"""Ratio at which the SO-101 keeps its target; at 20 it loses one in six (`feelahead try demo`)"""
 _SAMPLES: Final = 2000
 _MOST_STARTS: Final = 48
 _FEWEST_JOINTS: Final = 5
@@ -95,15 +106,17 @@ def settle(table: Any, model: Any, robot: RobotModel, start: FloatArray, *, may_
     """
     travel = _travel(model, robot, start)
     moved_m = 0.0 if travel is None else move_site(model, robot, start, travel)
-    thick_m = math.inf if travel is None else _thickest_m(model, robot, start, travel)
+    low = travel is not None and still_side(model, _placed(model, start), robot, travel) != 0.0
+    into_m = LOW_INTO_M if low else INTO_M
+    thick_m = math.inf if travel is None else _thickest_m(model, robot, start, travel, into_m)
     most = _MOST_STARTS if may_search and robot.arm_joints.size >= _FEWEST_JOINTS else 0
     for number, tried in enumerate(chain([start], islice(_other_starts(model, robot, start), most))):
-        fit_target(table, thick_m, 0.0 if travel is None else _lean(model, robot, tried, travel))
+        fit_target(table, thick_m, 0.0 if travel is None else _lean(model, robot, tried, travel), low=low)
         if (place := _find_place(table, model, robot, tried, travel)) is not None:
             settled = Settled(tried, place, moved_m, number > 0)
             break
     else:
-        fit_target(table, thick_m)
+        fit_target(table, thick_m, low=low)
         settled = Settled(start, usual_place(model, robot, start), moved_m, found=False)
     if travel is not None:
         closing = closing_direction(model, _placed(model, settled.start), robot, travel)
@@ -112,15 +125,16 @@ def settle(table: Any, model: Any, robot: RobotModel, start: FloatArray, *, may_
     return settled
 
 
-def fit_target(table: Any, thick_m: float, lean: float = 0.0) -> None:
+def fit_target(table: Any, thick_m: float, lean: float = 0.0, *, low: bool = False) -> None:
     """Make the target at most `thick_m` thick, and so low that it stands safely.
 
-    lean: vertical part of the fingers' direction of closing; fingers askew need room beside an upright target.
+    lean: vertical part of the fingers' direction of closing; fingers askew need room beside an upright target. low:
+    whether only one jaw moves.
     """
     target, body = table.geom("target"), table.body("target")
     most_m = max(0.5 * thick_m - lean * _TARGET_M[2], _THINNEST_M)
     length_m, width_m = min(_TARGET_M[0], most_m), min(_TARGET_M[1], most_m)
-    height_m = min(_TARGET_M[2], max(_SLIMMEST * width_m, _LOWEST_M))
+    height_m = _LOW_M if low else min(_TARGET_M[2], max(_SLIMMEST * width_m, _LOWEST_M))
     target.size, body.pos = [length_m, width_m, height_m], [*body.pos[:2], height_m]
 
 
@@ -193,14 +207,14 @@ def _turn_target(table: Any, closing: FloatArray, yaw_rad: float) -> None:
     table.body("target").quat = [math.cos(0.5 * turn_rad), 0.0, 0.0, math.sin(0.5 * turn_rad)]
 
 
-def _thickest_m(model: Any, robot: RobotModel, start: FloatArray, travel: GripperTravel) -> float:
-    """Return how thick an object around the tool's point the gripper grasps well.
+def _thickest_m(model: Any, robot: RobotModel, start: FloatArray, travel: GripperTravel, into_m: float) -> float:
+    """Return how thick an object around the tool's point, that reaches by `into_m` into the hand, is grasped well.
 
     One jaw may be nearer to the point than the other.
     """
     data = _placed(model, start)
     closing, most_m = closing_direction(model, data, robot, travel), 0.5 * float(travel.openings_m[0])
-    clear_m = 2.0 * min(rooms_m(model, data, robot, data.site_xpos[robot.site], closing, most_m))
+    clear_m = 2.0 * min(rooms_m(model, data, robot, data.site_xpos[robot.site], closing, most_m, into_m))
     return min(_SPANNED * clear_m, clear_m - 2.0 * _BESIDE_M)
 
 
@@ -248,6 +262,16 @@ def attach(table: Any, spec: Any, model: Any, robot: RobotModel, start: FloatArr
             quat=[math.cos(place.yaw_rad / 2.0), 0.0, 0.0, math.sin(place.yaw_rad / 2.0)],
         ),
     )
+
+
+def keep_from_slipping(spec: Any) -> None:
+    """Let friction resist slip in a model that leaves MuJoCo's contacts as they are, as what it holds would slip.
+
+    As MuJoCo's documentation advises against slip: elliptic friction cones, and a higher `impratio`.
+    """
+    option = spec.option
+    if option.cone == mujoco.mjtCone.mjCONE_PYRAMIDAL and option.impratio == 1.0 and option.noslip_iterations == 0:
+        option.cone, option.impratio = mujoco.mjtCone.mjCONE_ELLIPTIC, _IMPRATIO
 
 
 def _placed(model: Any, start: FloatArray) -> Any:

@@ -64,6 +64,29 @@ def test_a_site_far_from_the_fingertips_is_moved_between_them(tmp_path: Path, pl
     assert "from the site 'tool', between the fingertips" in own.start_pose
 
 
+def test_where_only_one_jaw_moves_the_tool_is_near_the_other_one_and_the_target_is_low(tmp_path: Path) -> None:
+    one_jaw = (
+        ('<joint name="right_finger" axis="0 -1 0"/>', ""),
+        ('<joint joint="right_finger" coef="1"/>', ""),
+        ('<joint joint1="left_finger" joint2="right_finger" solimp="0.95 0.99 0.001" solref="0.005 1"/>', ""),
+        ('<body name="right_finger" pos="0 0 0.08"', '<body name="right_finger" pos="0 -0.0425 0.08"'),
+        (" 0.0425 0.0425", " 0.0425"),
+        ('pos="0 0 0.145"', 'pos="0 0 0.045"'),
+    )
+    scene = load_scene(brought(tmp_path, *one_jaw), "tool")
+    still = scene.data.geom("right_fingertip")
+    away_m = still.xmat.reshape(3, 3)[:, 1] @ (scene.data.site_xpos[scene.robot.site] - still.xpos)
+    assert away_m == pytest.approx(0.006 + 0.033, abs=1e-3)
+    assert scene.model.geom("table_scene/target").size[2] == pytest.approx(0.03)
+
+
+@pytest.mark.parametrize(("own", "kept"), [('cone="elliptic" impratio="10"', 10.0), ("", 30.0)])
+def test_only_a_model_that_chooses_no_contacts_gets_others_at_the_table(tmp_path: Path, own: str, kept: float) -> None:
+    scene = load_scene(brought(tmp_path, ('cone="elliptic" impratio="10"', own)), "tool")
+    assert scene.model.opt.impratio == kept
+    assert scene.model.opt.cone == mujoco.mjtCone.mjCONE_ELLIPTIC
+
+
 def test_fingers_that_would_close_up_and_down_get_another_start(tmp_path: Path) -> None:
     # Without a keyframe, this wrist starts with one finger above the other.
     wrist = ('<joint name="wrist_3"/>', '<joint name="wrist_3" range="-1.5708 4.7124"/>')
