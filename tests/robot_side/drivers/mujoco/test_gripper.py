@@ -9,8 +9,10 @@ import pytest
 
 from common.arrays import FloatArray
 from common.errors import ConfigurationError
+from robot_side.compiled.kernel import FLOAT64, compiled, output_array, record_array
 from robot_side.drivers.mujoco import gripper_cover
 from robot_side.drivers.mujoco.gripper_cover import cover_gripper
+from robot_side.drivers.mujoco.gripper_drive import GRIPPER, GripperDrive, advance_gripper
 from robot_side.drivers.mujoco.gripper_measurement import (
     GripperSweep,
     candidate_ends,
@@ -60,6 +62,37 @@ def test_a_servo_leads_by_its_force_and_lags_by_its_damping(tmp_path: Path) -> N
     assert travel.lag_s == pytest.approx(10.0 / 100.0)
     assert (travel.open_control.item(), travel.closed_control.item()) == (255.0, 0.0)
     np.testing.assert_allclose(travel.openings_m[[0, -1]], [0.08, 0.0], atol=1e-3)
+
+
+@compiled(record_array(GRIPPER), output_array(2), FLOAT64, FLOAT64, FLOAT64, FLOAT64)
+def advance_one(
+    grippers: Any, samples: FloatArray, moving: float, step_s: float, length: float, length_speed: float
+) -> None:
+    advance_gripper(grippers[0], samples, moving, step_s, length, length_speed)
+
+
+def test_what_slips_between_the_fingers_is_held_until_they_close_fast_or_open(tmp_path: Path) -> None:
+    travel = measure_gripper(load_scene(planar_arm(tmp_path), "tcp"))
+    assert travel is not None
+    drive, closure = GripperDrive(travel, stroke_time_s=0.6), 0.4
+
+    def move(speed_1_s: float, duration_s: float, moving: float = 1.0) -> bool:
+        nonlocal closure
+        stroke = float(travel.lengths[-1] - travel.lengths[0])
+        for _ in range(round(duration_s / 0.001)):
+            closure += 0.001 * speed_1_s
+            length = float(travel.lengths[0]) + stroke * closure
+            advance_one(drive.drive, drive.samples, moving, 0.001, length, stroke * speed_1_s)
+        return drive.holding
+
+    assert move(0.0, 0.5)
+    assert move(0.5, 0.2)
+    assert move(-0.3, 0.2)
+    assert not move(1.0 / 0.6, 0.15)
+    # Once lost, only fingers that stand hold something again.
+    assert not move(0.5, 0.1)
+    assert move(0.0, 0.5)
+    assert not move(0.0, 0.001, moving=-1.0)
 
 
 @pytest.mark.parametrize(("name", "said"), [('name="hand" ', "'hand'"), ("", "2")])
