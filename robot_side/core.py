@@ -194,8 +194,10 @@ class RobotSide:
         self._heard.on_step("frame")
         seen: list[Outgoing] = []
         if (found := self._found) is not None:
-            target = None if self.sight.target is None else found.situation.objects.names[self.sight.target]
-            seen = self.reports.telemetry(found, target, self.motion.hindrance, now_s)
+            permission, _, state, situation, sensed, _, target_m = found
+            target = None if self.sight.target is None else situation.objects.names[self.sight.target]
+            shown = situation, sensed, state, target, target_m, self.motion.hindrance
+            seen = self.reports.telemetry(permission.state, *shown, now_s)
         self.sight.see(now_s)
         self._heard.on_step("end")
         self._heard.on_sent(now_s)

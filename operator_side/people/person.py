@@ -265,8 +265,7 @@ class SimulatedOperator:
         """
         if self._dropped(look):
             return
-        height_m = look.view.tool_position_m[2]
-        stalled = self._sinking.see(height_m, GENTLY_M_S, look)
+        stalled = self._sinking.see(look.view.tool_position_m[2], GENTLY_M_S, look)
         stiff = self._fingers.resisted_share() > self._settings.noticeable_force
         if stalled and stiff and not self._stands and self._gently_m_s < _PRESSES_M_S:
             self._gently_m_s += GENTLY_M_S
@@ -274,9 +273,9 @@ class SimulatedOperator:
         elif stalled or self._stands:
             self._from = look.view.tool_position_m
             self._enter(Doing.LETTING_GO, look.now_s)
-        left_m = height_m - self._gripped_height_m + self._depth_error_m
-        speed = max(min(_CARRY_M_S, look.gain * left_m), self._gently_m_s)
-        x, y, z = (-speed * part for part in look.view.up_in_tool)
+        left_m = look.view.tool_position_m[2] - self._gripped_height_m + self._depth_error_m
+        down = -max(min(_CARRY_M_S, look.gain * left_m), self._gently_m_s)
+        x, y, z = (down * part for part in look.view.up_in_tool)
         # A stick that goes on while the trigger is stopped would drag the object along the table.
         self._go((0.0, 0.0, z) if stiff else (x, y, z), {Button.CROSS})
 

@@ -5,10 +5,12 @@ from typing import Final
 import msgspec
 import numpy as np
 
+from common.arrays import FloatArray
 from common.protocol.codec import encode
+from common.protocol.messages import MotionState
 from robot_side.arm.hindrance import Hindrance
+from robot_side.arm.port import ArmState
 from robot_side.arm.stick_frames import StickFrames
-from robot_side.events import Found
 from robot_side.laws.law import Law, Situation
 from robot_side.laws.sensed import Sensed
 from robot_side.motion import Motion
@@ -62,13 +64,25 @@ class Reports:
             outgoing += [stiffness_message(one, *felt) for one in session.observers(now_s)]
         return outgoing
 
-    def telemetry(self, found: Found, target: str | None, hindrance: Hindrance, now_s: float) -> list[Outgoing]:
-        """Return the telemetry of a tick's results, if it is due at `now_s`. target: the target's name."""
-        state, situation = found.permission.state, found.situation
+    def telemetry(
+        self,
+        state: MotionState,
+        situation: Situation,
+        sensed: Sensed,
+        arm: ArmState,
+        target: str | None,
+        target_m: FloatArray | None,
+        hindrance: Hindrance,
+        now_s: float,
+    ) -> list[Outgoing]:
+        """Return the telemetry of a tick's results, if it is due at `now_s`.
+
+        target: the target's name; target_m: its centre (3,), NaN if unknown.
+        """
         holding = situation.held is not None
         if not self._seen.may_be_due((self._session.lease.token, state, target, holding, hindrance.text), now_s):
             return []
-        shown = state, situation.pose, found.sensed, found.state, target, found.target_m, hindrance, self._frames
+        shown = state, situation.pose, sensed, arm, target, target_m, hindrance, self._frames
         view = telemetry(*shown, holding=holding, settled=situation.loop_age_settled)
         if not self._seen.due(view, now_s):
             return []

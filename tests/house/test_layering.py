@@ -64,8 +64,7 @@ ARROWS = """
     robot_side/homing.py: common common/protocol robot_side/arm robot_side/gripper robot_side/surroundings
     robot_side/motion.py: common robot_side/arm robot_side/gripper robot_side/laws robot_side/operators
     robot_side/reporting: common common/emulation common/protocol common/rate common/sockets robot_side/arm
-        robot_side/compiled robot_side/gripper robot_side/laws robot_side/motion.py robot_side/operators
-        robot_side/surroundings
+        robot_side/compiled robot_side/laws robot_side/motion.py robot_side/operators
     robot_side/events.py: common robot_side/arm robot_side/laws robot_side/operators robot_side/reporting
         robot_side/surroundings
     robot_side/outcome: common robot_side/events.py robot_side/laws robot_side/outcome/truth.py
