@@ -261,12 +261,13 @@ class SimulatedOperator:
     def _lowering(self, look: Glance) -> None:
         """Lower the object until it is felt or seen to stand: gently after a cue and near the expected height.
 
-        If it sinks no more because of a stiff trigger, press that alone, harder step by step.
+        If a stiff trigger stops it, as it may from above, press that alone, harder step by step, and rest the stick.
         """
         if self._dropped(look):
             return
         stalled = self._sinking.see(look.view.tool_position_m[2], GENTLY_M_S, look)
         stiff = self._fingers.resisted_share() > self._settings.noticeable_force
+        stiff &= look.view.up_in_tool[2] < _FROM_ABOVE
         if stalled and stiff and not self._stands and self._gently_m_s < _PRESSES_M_S:
             self._gently_m_s += GENTLY_M_S
             self._sinking.presses(look.now_s)
@@ -274,9 +275,8 @@ class SimulatedOperator:
             self._from = look.view.tool_position_m
             self._enter(Doing.LETTING_GO, look.now_s)
         left_m = look.view.tool_position_m[2] - self._gripped_height_m + self._depth_error_m
-        down = -max(min(_CARRY_M_S, look.gain * left_m), self._gently_m_s)
-        x, y, z = (down * part for part in look.view.up_in_tool)
-        # A stick that goes on while the trigger is stopped would drag the object along the table.
+        speed = max(min(_CARRY_M_S, look.gain * left_m), self._gently_m_s)
+        x, y, z = (-speed * part for part in look.view.up_in_tool)
         self._go((0.0, 0.0, z) if stiff else (x, y, z), {Button.CROSS})
 
     def _letting_go(self, look: Glance) -> None:

@@ -298,6 +298,18 @@ def test_from_above_they_press_a_stiff_trigger_harder_in_steps_to_2_n_before_the
     assert max(pressed) == pytest.approx(2.0, abs=0.1)
 
 
+def test_a_stiff_trigger_beside_the_way_down_does_not_keep_them_from_lowering() -> None:
+    # A tool that points slightly up lowers by the stick, and a little by L2.
+    up = (0.0, -0.98, 0.2)
+    desk = carried()
+    desk.resist(FREE_TRIGGER, feedback(0, 8))
+    for step in range(120):
+        desk.watch(at_height(UP_AT_M - 0.001 * step, up_in_tool=up), FRAME_S)
+    assert desk.hands[-1].l2_n > 0.0
+    assert stick_speed_m_s(desk.hands[-1]) > 0.9 * GENTLY_M_S
+    assert desk.hands[-1].phase == Doing.LOWERING
+
+
 def test_at_the_warning_light_they_rest_their_hands_and_go_on_a_moment_after_it() -> None:
     desk = Desk()
     desk.arm()
