@@ -43,7 +43,8 @@ class StalledApproach:
 class StalledDescent:
     """Detects that an object that was sinking does not sink any more, so that it stands."""
 
-    def __init__(self) -> None:
+    def __init__(self, now_s: float) -> None:
+        self._began_s = now_s
         self._heights: deque[tuple[float, float]] = deque()
         self._sank = False
         self._pressed_s = -math.inf
@@ -58,6 +59,6 @@ class StalledDescent:
         while self._heights[0][0] < look.now_s - _STANDS_S:
             self._heights.popleft()
         share = (self._heights[0][1] - height_m) / (slowest_m_s * _STANDS_S)
-        # A slight sinking before lowering does not count.
-        self._sank |= share > 0.5
+        # A slight sinking before lowering does not count; an object that never sinks is stopped, too.
+        self._sank |= share > 0.5 or look.now_s - self._began_s > _NO_FURTHER_S + look.lag_s
         return self._sank and share < 0.2 and look.now_s - self._pressed_s > _STANDS_S + look.lag_s

@@ -154,7 +154,7 @@ class SimulatedOperator:
         self._gently_along = self._gently_across = self._stands = False
         self._gently_m_s = GENTLY_M_S
         self._moves.forget()
-        self._nearing, self._sinking = StalledApproach(now_s), StalledDescent()
+        self._nearing, self._sinking = StalledApproach(now_s), StalledDescent(now_s)
 
     def _elapsed_s(self, look: Glance) -> float:
         return look.now_s - self._since_s

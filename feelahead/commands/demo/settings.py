@@ -77,13 +77,13 @@ class DemoSettings(RunOptions):
             raise ValueError(
                 f"--scene {self.scene} and --model exclude each other, as a model has its own scene; valid: one of them"
             )
-
-        if (self.model is None) != (self.site is None):
-            raise ValueError("--model and --site; valid: both, or neither for the built-in arm")
         files = {"--model": self.model, "--robot-config": self.robot_config, "--operator-config": self.operator_config}
         for flag, path in files.items():
             if path is not None and not path.is_file():
                 raise ValueError(f"{flag} {path}: there is no such file; valid: an existing file")
+        if (self.model is None) != (self.site is None):
+            given, missing = ("--site", "--model") if self.model is None else ("--model", "--site")
+            raise ValueError(f"{given} is given without {missing}; valid: both, or neither for the built-in arm")
 
     @property
     def has_pages(self) -> bool:

@@ -298,6 +298,11 @@ def test_from_above_they_press_a_stiff_trigger_harder_in_steps_to_2_n_before_the
     assert max(pressed) == pytest.approx(2.0, abs=0.1)
 
 
+def test_an_object_that_is_stopped_from_the_first_is_let_go_at_last() -> None:
+    desk = carried()
+    assert 2.5 < desk.until(Doing.LETTING_GO, at_height(UP_AT_M), 5.0) < 4.0
+
+
 def test_a_stiff_trigger_beside_the_way_down_does_not_keep_them_from_lowering() -> None:
     # A tool that points slightly up lowers by the stick, and a little by L2.
     up = (0.0, -0.98, 0.2)
