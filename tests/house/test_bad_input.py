@@ -41,7 +41,7 @@ def complaint(command: str) -> str:
         ("feelahead demo --tui --status json", "--status json", "one of them"),
         ("feelahead demo --console-port 99999", "99999", "65535"),
         ("feelahead demo --probability nan", "nan", "above 0 and below 1"),
-        ("feelahead demo --site tip", "--model and --site", "both"),
+        ("feelahead demo --site tip", "--site is given without --model", "both"),
         ("feelahead demo --model missing.xml --site tip", "missing.xml", "an existing file"),
         ("feelahead demo --robot-config missing.toml", "missing.toml", "an existing file"),
         ("feelahead doctor --keys /tmp", "--keys", "both"),
