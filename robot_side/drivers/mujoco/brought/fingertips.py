@@ -39,15 +39,29 @@ def move_site(model: Any, robot: RobotModel, start: FloatArray, travel: GripperT
 
 def closing_direction(model: Any, data: Any, robot: RobotModel, travel: GripperTravel) -> FloatArray:
     """Return the direction (3,) across the tool, in the world, along which the fingers close; leave them open."""
-    middles_m = []
+    moved_m = _closing_motions_m(model, data, robot, travel)
+    across = data.site_xmat[robot.site].reshape(3, 3)[:, :2]
+    moved_across_m = moved_m @ across
+    closing: FloatArray = across @ np.linalg.eigh(moved_across_m.T @ moved_across_m)[1][:, -1]
+    return closing
+
+
+def still_side(model: Any, data: Any, robot: RobotModel, travel: GripperTravel, closing: FloatArray) -> float:
+    """Return 1 or -1 if only the jaw ahead or behind along `closing` stands still, else 0; leave the fingers open."""
+    moved_m = _closing_motions_m(model, data, robot, travel) @ closing
+    signs = np.sign(moved_m[np.abs(moved_m) > _STILL_M])
+    return float(signs[0]) if signs.size > 0 and (signs == signs[0]).all() else 0.0
+
+
+def _closing_motions_m(model: Any, data: Any, robot: RobotModel, travel: GripperTravel) -> FloatArray:
+    """Return how far each of the gripper's geoms (g, 3) moves, in the world, as the fingers close; leave them open."""
+    places_m = []
     for fingers in (travel.closed_fingers, travel.open_fingers):
         data.qpos[robot.finger_positions] = fingers
         mujoco.mj_kinematics(model, data)
-        middles_m.append(data.geom_xpos[robot.gripper_geoms])
-    across = data.site_xmat[robot.site].reshape(3, 3)[:, :2]
-    moved_m = np.subtract(*middles_m) @ across
-    closing: FloatArray = across @ np.linalg.eigh(moved_m.T @ moved_m)[1][:, -1]
-    return closing
+        places_m.append(data.geom_xpos[robot.gripper_geoms])
+    motions_m: FloatArray = np.subtract(*places_m)
+    return motions_m
 
 
 def room_m(corners_m: FloatArray, from_m: FloatArray, way: FloatArray, most_m: float, *, into: FloatArray) -> float:
@@ -85,6 +99,7 @@ def rooms_m(
 def _between(model: Any, data: Any, robot: RobotModel, travel: GripperTravel) -> FloatArray:
     """Return the way (3,), in the world, from the site to midway between the fingers, inside their ends.
 
+    If only one jaw moves, the way ends near the other one instead.
     The ends are those of the open fingers, or of the closed ones if these reach farther. `data` is left open.
     """
     fingers, ends_m = robot.gripper_geoms[robot.geom_on_finger], []
@@ -99,21 +114,9 @@ def _between(model: Any, data: Any, robot: RobotModel, travel: GripperTravel) ->
     mujoco.mj_geomDistance(model, data, *nearest_pair(model, data, robot, apart_m), 2.0 * apart_m, ends)
     across_m = float((ends.reshape(2, 3).mean(axis=0) - site_m) @ closing)
     middle_m = across_m * closing + (max(ends_m) - _INSIDE_M) * approach
-    still = still_side(model, data, robot, travel)
+    still = still_side(model, data, robot, travel, closing)
     reach_m = (0.5 * apart_m, INTO_M) if still == 0.0 else (apart_m, LOW_INTO_M)
     left_m, right_m = rooms_m(model, data, robot, site_m + middle_m, closing, *reach_m)
     aside_m = 0.5 * (right_m - left_m) if still == 0.0 else right_m - _NEAR_M if still > 0.0 else _NEAR_M - left_m
     between_m: FloatArray = middle_m + aside_m * closing
     return between_m
-
-
-def still_side(model: Any, data: Any, robot: RobotModel, travel: GripperTravel) -> float:
-    """Return 1 or -1 if only the jaw ahead or behind along `closing_direction` stands still, else 0."""
-    closing, places_m = closing_direction(model, data, robot, travel), []
-    for fingers in (travel.closed_fingers, travel.open_fingers):
-        data.qpos[robot.finger_positions] = fingers
-        mujoco.mj_kinematics(model, data)
-        places_m.append(data.geom_xpos[robot.gripper_geoms] @ closing)
-    moved_m = np.subtract(*places_m)
-    ways = np.sign(moved_m[np.abs(moved_m) > _STILL_M])
-    return float(ways[0]) if ways.size > 0 and (ways == ways[0]).all() else 0.0
