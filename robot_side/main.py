@@ -15,6 +15,7 @@ from common.loop.process import Process
 from common.realtime.priority import raise_descriptor_limit
 from common.sockets.authentication import RobotKeys
 from common.sockets.robot import RobotSockets
+from robot_side.compiled.kernel import late_kernels
 from robot_side.compiled.warm_up import warm_up
 from robot_side.core import RobotParts, RobotSide
 from robot_side.drivers.remote.connected_drivers import ConnectedDrivers
@@ -99,7 +100,9 @@ def command(arguments: Sequence[str], adapt: Callable[[RobotParts], Adapted] = a
             for text in keys.notes() if keys is not None else [_OPEN_TO_ALL] if settings.insecure else []:
                 process.note(text)
             status.event("listening", control=sockets.control_endpoint, view=sockets.view_endpoint)
-            return RobotTurns(settings, core, view, cameras, sockets, process, beside, physics)
+            turns = RobotTurns(settings, core, view, cameras, sockets, process, beside, physics)
+            process.stack.enter_context(late_kernels(turns.note_late))
+            return turns
 
         return process.run(open_side)
 

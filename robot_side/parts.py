@@ -49,11 +49,6 @@ from robot_side.viewing.viewpoints import stick_frames
 
 _NAMED_OBJECTS = 8
 """Maximum number of objects that a note names"""
-_LIBRARY = (
-    *("robot_side.overlap.kernels.", "robot_side.overlap.lanes.", "robot_side.overlap.precise."),
-    "robot_side.arm.resolved_rate.",
-)
-"""Prefixes of the kernels of library functions that no tick runs: batches, precise forms, joint velocities alone"""
 
 
 class SimulationObserver:
@@ -93,9 +88,7 @@ class SceneParts(RobotParts):
         """
         seen = _as_loaded(self.scene, dict.fromkeys(self.scene.roles, Role.OBSTACLE))
         unneeded = {kind.kernel for kind in KINDS if not (self.any_objects or len(getattr(seen, kind.owner)))}
-        return [
-            kernel for kernel in imported_kernels() if kernel not in unneeded and not kernel.name.startswith(_LIBRARY)
-        ]
+        return [kernel for kernel in imported_kernels() if kernel not in unneeded]
 
 
 def build_parts(

@@ -23,6 +23,9 @@ from robot_side.viewing.view_scheduler import ViewScheduler
 
 KEYS_PERIOD_S: Final = 0.2
 """Period of reading the list of allowed keys, in seconds: a revoked operator is disconnected within a second."""
+_LATE: Final = (
+    "{} is compiled only now, which may stop the arm for seconds: a defect of this program, please report this line"
+)
 
 
 class RobotTurns:
@@ -51,8 +54,14 @@ class RobotTurns:
             core.session, self._sending.budget, lambda: self._looking.pictures, sockets.tcp_figures
         )
         self._next_keys_s = process.loop.clock.now()
+        self._compiled_late = 0
         self.wait, self.receive, self.next_due = sockets.wait, sockets.receive, self._sending.next_due
         self.note = process.note
+
+    def note_late(self, kernel: str) -> None:
+        """Count and report a kernel that a turn has to compile, or to load, before it can go on."""
+        self._compiled_late += 1
+        self.note(_LATE.format(kernel))
 
     @property
     def resting(self) -> bool:
@@ -120,6 +129,7 @@ class RobotTurns:
             "rate": {"robot": self._sending.budget.summary() | {"pictures": self._looking.pictures}},
             "beside": self._beside.summary(),
             "looked_at": self._looking.summary(),
+            "compiled_late": self._compiled_late,
             "strangers": {
                 "refused": sockets.refused,
                 "revoked": sockets.revoked,

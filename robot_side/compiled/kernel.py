@@ -133,11 +133,25 @@ def _uncollected() -> Iterator[None]:
 
 
 _kernels: list["Compiled"] = []
+_told: list[Callable[[str], None]] = []
 
 
 def imported_kernels() -> tuple["Compiled", ...]:
     """Return the kernels of every module that has been imported so far."""
     return tuple(_kernels)
+
+
+@contextlib.contextmanager
+def late_kernels(told: Callable[[str], None]) -> Iterator[None]:
+    """While this is open, call `told` with the name of each kernel that is only now compiled or loaded.
+
+    So a run is told of what holds up one of its turns. If `told` raises an error, the kernel is not prepared.
+    """
+    _told.append(told)
+    try:
+        yield
+    finally:
+        _told.remove(told)
 
 
 class Compiled:
@@ -167,6 +181,8 @@ class Compiled:
         """Compile the kernel, or load it from disk, unless that is done already."""
         with self._preparing:
             if not self.ready:
+                for told in _told:
+                    told(self.name)
                 keep_on_disk(self._dispatcher, self.name, self._key())
                 with _uncollected():
                     self._dispatcher.compile(self.signature)

@@ -7,33 +7,12 @@ import numpy as np
 
 from common.arrays import FloatArray, IntArray, require_finite
 from robot_side.arm.port import GripperPose
+from robot_side.field.along import Along
 from robot_side.field.look import look
 from robot_side.field.scratch import Error, Scratch
 from robot_side.surroundings.scene_table import SceneTable
 
 _STILL: FloatArray = np.empty(0)
-
-
-@dataclass(frozen=True)
-class Along:
-    """Direction of a look, and the uncertainty along it (eq. 9-10)."""
-
-    direction: FloatArray
-    """û (3,), unit, in the world frame"""
-    mean_m: float
-    """Mean error of arm and camera along û: û·(μ_ee - μ_c)"""
-    variance_m2: float
-    """Variance of the camera's error: σ_c²"""
-    quantile: float
-    """Standard normal quantile of the probability P: Φ⁻¹(P)"""
-    reach_m: float
-    """Distance that is examined along û"""
-    mean_along_m: float = 0.0
-    """Mean prediction error of the delay displacement: μ_δ"""
-    variance_along_m2: float = 0.0
-    """Variance of the prediction error: σ_δ²"""
-    approach_m: FloatArray | None = None
-    """Distance by which each object (k,) approaches; its contact distances are shortened by it. None: all at rest."""
 
 
 @dataclass(frozen=True)

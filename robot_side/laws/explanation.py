@@ -9,7 +9,7 @@ import numpy as np
 from common.arrays import FloatArray, IntArray
 from common.protocol.view_messages import EnlargementTerms
 from robot_side.arm.port import GripperPose
-from robot_side.field.field import Along
+from robot_side.field.along import Along
 from robot_side.field.inflation import explain_inflation
 from robot_side.field.total_overlap import total_overlap_m3
 from robot_side.laws.law import Situation

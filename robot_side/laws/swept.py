@@ -26,7 +26,7 @@ from robot_side.arm.port import GripperPose
 from robot_side.arm.resolved_rate import refuse
 from robot_side.arm.tool_motion import ToolMotionSettings, full_twists
 from robot_side.enlargement.distance import Uncertainty
-from robot_side.field.field import Along
+from robot_side.field.along import Along
 from robot_side.field.look import look
 from robot_side.field.object_class import OBSTACLE, SKIPPED, TARGET, TOUCHABLE
 from robot_side.field.scratch import Count, Scratch

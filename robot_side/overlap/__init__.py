@@ -6,14 +6,13 @@ computes overlaps that are too small for it.
 """
 
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
-
-from robot_side.compiled.warm_up import warm_up
-from robot_side.overlap.volumes import sphere_box, sphere_half_space, sphere_sphere, sphere_tetrahedron
+from typing import TYPE_CHECKING, Any, Final
 
 if TYPE_CHECKING:
+    from robot_side.compiled.warm_up import warm_up
     from robot_side.overlap.meshes.mesh import Mesh, sphere_mesh
     from robot_side.overlap.meshes.mesh_library import MeshLibrary
+    from robot_side.overlap.volumes import sphere_box, sphere_half_space, sphere_sphere, sphere_tetrahedron
 
 __all__ = [
     "Mesh",
@@ -25,12 +24,22 @@ __all__ = [
     "sphere_tetrahedron",
     "warm_up",
 ]
+_OF_MESHES: Final = "robot_side.overlap.meshes.mesh_pairs"
+_MODULES: Final = {
+    "Mesh": (_OF_MESHES, "robot_side.overlap.meshes.mesh"),
+    "MeshLibrary": (_OF_MESHES, "robot_side.overlap.meshes.mesh_library"),
+    "sphere_mesh": (_OF_MESHES, "robot_side.overlap.meshes.mesh"),
+    "warm_up": ("robot_side.compiled.warm_up",),
+}
+"""Modules to import, beside `volumes`, for a public name; the last one has it"""
 
 
 def __getattr__(name: str) -> Any:
-    """Import the names for meshes on first use, so that a program without meshes does not compile their kernels."""
-    if name == "MeshLibrary":
-        return import_module("robot_side.overlap.meshes.mesh_library").MeshLibrary
-    if name in {"Mesh", "sphere_mesh"}:
-        return getattr(import_module("robot_side.overlap.meshes.mesh"), name)
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    """Import the library's modules, with their kernels, on the first use of a public name.
+
+    A robot side uses none of these names, and so compiles none of these kernels.
+    """
+    if name not in __all__:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    modules = [import_module(module) for module in ("robot_side.overlap.volumes", *_MODULES.get(name, ()))]
+    return getattr(modules[-1], name)

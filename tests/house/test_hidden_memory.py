@@ -10,6 +10,7 @@ from tests.helpers.repository import ROOT
 
 REGISTRIES = {
     ("robot_side/compiled/kernel.py", "_kernels"),  # Filled while modules are imported.
+    ("robot_side/compiled/kernel.py", "_told"),  # Those whom a running process has asked to be told.
 }
 PACKAGES = ("common", "robot_side", "operator_side", "feelahead")
 CHANGES = {

@@ -15,7 +15,7 @@ import numpy as np
 from common.arrays import BoolArray, FloatArray, IntArray
 from feelahead.lab.reference.solids import Solids
 from robot_side.arm.port import GripperPose
-from robot_side.field.field import Along
+from robot_side.field.along import Along
 from robot_side.field.look import LEAST_DEPTH_M, MARGIN_M
 from robot_side.field.object_class import SKIPPED, TARGET, TOUCHABLE
 from robot_side.field.scratch import STRENGTHS, TOUCH_STRENGTH

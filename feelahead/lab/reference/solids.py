@@ -9,7 +9,8 @@ import numpy as np
 
 from common.arrays import FloatArray, IntArray
 from robot_side.overlap import sphere_box, sphere_half_space, sphere_sphere, sphere_tetrahedron
-from robot_side.overlap.meshes.mesh_library import mesh_pairs, nearest_mesh_pairs
+from robot_side.overlap.meshes.mesh_library import nearest_mesh_pairs
+from robot_side.overlap.meshes.mesh_pairs import mesh_pairs
 from robot_side.surroundings.kinds.ellipsoid import overlap_one_ellipsoid
 from robot_side.surroundings.kinds.layout import rows
 from robot_side.surroundings.perceived import PerceivedObjects

@@ -19,7 +19,8 @@ from robot_side.drivers.mujoco.encoders import Encoder
 from robot_side.drivers.mujoco.posed_scene import PosedScene
 from robot_side.drivers.mujoco.scene import load_scene
 from robot_side.enlargement.distance import standard_quantile
-from robot_side.field.field import Ahead, Along, Field
+from robot_side.field.along import Along
+from robot_side.field.field import Ahead, Field
 from robot_side.field.object_class import OBSTACLE
 from robot_side.settings import CameraSettings, EncoderSettings
 from robot_side.surroundings.scene_table import scene_table

@@ -19,7 +19,6 @@ from robot_side.overlap.meshes.closed_surface import (
     require_outward,
     signed_volume,
 )
-from robot_side.overlap.meshes.mesh_kernels import overlap_loop
 from robot_side.overlap.meshes.mesh_tables import mesh_tables
 
 Array = npt.ArrayLike
@@ -76,6 +75,9 @@ class Mesh:
         return self._query(centers, radii)[1]
 
     def _query(self, centers: Array, radii: Array) -> tuple[Overlaps, IntArray]:
+        # A robot side makes meshes and never asks them, and so compiles no kernel for it.
+        from robot_side.overlap.meshes.mesh_pairs import overlap_loop  # noqa: PLC0415
+
         arguments = numbers("centers", centers, (3,)), lengths("radii", radii)
         shape = broadcast(arguments)
         rows = [argument.rows(shape) for argument in arguments]

@@ -1,7 +1,7 @@
-"""Overlaps and distances of (sphere, placed mesh) pairs in contiguous arrays, for calls in a 1 kHz tick.
+"""Distances of (point, placed mesh) pairs in contiguous arrays, for calls in a 1 kHz tick.
 
-Arguments are not checked, as in `kernels`. A placed mesh is queried in its own frame. There the sphere's centre is
-Qᵀ (centre - position), with Q the rotation from the mesh's frame to the world.
+Arguments are not checked, as in `kernels`. A placed mesh is queried in its own frame. There a point, or a sphere's
+centre, is Qᵀ (centre - position), with Q the rotation from the mesh's frame to the world.
 """
 
 from common.arrays import FloatArray, IntArray
@@ -12,29 +12,25 @@ from robot_side.compiled.kernel import (
     input_array,
     input_indices,
     output_array,
-    output_indices,
     tuple_type,
 )
-from robot_side.compiled.stack import on_stack
-from robot_side.compiled.vectors import Vector, dot, load, negative, norm, scale, subtract
+from robot_side.compiled.vectors import Vector, dot, load, negative, norm, scale
 from robot_side.overlap.digits.double_double import DoubleDouble, multiple, plus, two_sum
 from robot_side.overlap.digits.double_double_vectors import PreciseVector, highs
-from robot_side.overlap.meshes.mesh_overlap import mesh_overlap
 from robot_side.overlap.meshes.mesh_tables import MeshTables
-from robot_side.overlap.meshes.tree_queries import is_clear_of, nearest_triangle, winding_number
-from robot_side.overlap.meshes.triangle_lanes import SCRATCH
+from robot_side.overlap.meshes.tree_queries import nearest_triangle, winding_number
 
-_TABLES = tuple_type(
+TABLES = tuple_type(
     *(input_array(2), input_array(2), input_array(2), input_indices(), input_array(2), input_indices(), input_array(1)),
     named=MeshTables,
 )
+"""Numba type of `MeshTables`"""
 PLACED_ARGUMENTS = (input_indices(), input_array(2), input_array(3))
 """Numba types of placed meshes: indices of the meshes (q,), positions (q, 3) and rotations (q, 3, 3)"""
 
 _ON_SURFACE = 1e-12
 """Distance from the surface, as a share of the mesh's size, up to which the nearest triangle's normal decides whether a
 point is inside; the winding number decides farther away"""
-_scratch = on_stack(SCRATCH)
 
 
 @inlined
@@ -68,48 +64,6 @@ def to_world(rotations: FloatArray, pair: int, vector: Vector) -> Vector:
     return dot(load(rotation, 0), vector), dot(load(rotation, 1), vector), dot(load(rotation, 2), vector)
 
 
-@compiled(
-    *(input_array(2), input_array(1), input_indices(), *PLACED_ARGUMENTS),
-    _TABLES,
-    *(output_array(1), output_array(2), output_array(1), output_indices(), output_indices()),
-)
-def overlap_loop(
-    centers: FloatArray,
-    radii: FloatArray,
-    placed: IntArray,
-    mesh_index: IntArray,
-    positions: FloatArray,
-    rotations: FloatArray,
-    tables: MeshTables,
-    volumes: FloatArray,
-    gradients: FloatArray,
-    areas: FloatArray,
-    touched: IntArray,
-    near: IntArray,
-) -> None:
-    """Fill volumes, gradients (in the world frame), areas, and `touched`: how many triangles each pair evaluated.
-
-    placed (p,): each sphere's placed mesh, as a row of mesh_index, positions and rotations. near: scratch with room for
-    all triangles and one more.
-    """
-    scratch = _scratch()
-    for pair in range(radii.size):
-        place, radius = placed[pair], radii[pair]
-        mesh = mesh_index[place]
-        away = subtract(load(centers, pair), load(positions, place))
-        turned = rotations[place].T
-        rounded = dot(load(turned, 0), away), dot(load(turned, 1), away), dot(load(turned, 2), away)
-        if is_clear_of(tables, mesh, rounded, radius):
-            volumes[pair], areas[pair], touched[pair] = 0.0, 0.0, 0
-            gradients[pair, 0], gradients[pair, 1], gradients[pair, 2] = 0.0, 0.0, 0.0
-            continue
-        center = to_mesh(load(centers, pair), positions, rotations, place)
-        overlap, count = mesh_overlap(center, radius, tables, mesh, near, scratch)
-        gradient = to_world(rotations, place, overlap[1])
-        volumes[pair], areas[pair], touched[pair] = overlap[0], overlap[2], count
-        gradients[pair, 0], gradients[pair, 1], gradients[pair, 2] = gradient
-
-
 @building_block
 def _signed_distance(tables: MeshTables, mesh: int, point: Vector) -> tuple[float, Vector]:
     """Return (signed distance of `point` in m, negative inside; unit vector along which it falls fastest).
@@ -133,7 +87,7 @@ def _signed_distance(tables: MeshTables, mesh: int, point: Vector) -> tuple[floa
 
 @compiled(
     *(input_array(2), *PLACED_ARGUMENTS),
-    _TABLES,
+    TABLES,
     *(output_array(1), output_array(2)),
 )
 def nearest_loop(

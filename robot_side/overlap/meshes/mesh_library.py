@@ -7,9 +7,8 @@ from functools import cached_property
 import numpy as np
 
 from common.arrays import BoolArray, FloatArray, IntArray
-from robot_side.overlap.closed_forms.solid import Overlaps
 from robot_side.overlap.meshes.mesh import Mesh
-from robot_side.overlap.meshes.mesh_kernels import nearest_loop, overlap_loop
+from robot_side.overlap.meshes.mesh_kernels import nearest_loop
 from robot_side.overlap.meshes.mesh_tables import joined
 
 _FLAT_M = 1e-7
@@ -75,7 +74,7 @@ class MeshLibrary:
     def placed_middles_m(self, mesh_index: IntArray, positions: FloatArray, rotations: FloatArray) -> FloatArray:
         """Return the middles (q, 3) of the bounding volumes of placed meshes, in the world frame.
 
-        mesh_index (q,), positions (q, 3), rotations (q, 3, 3): as for `mesh_pairs`.
+        mesh_index (q,), positions (q, 3), rotations (q, 3, 3): as for `nearest_mesh_pairs`.
         """
         middles = self.bounds.middles_m.take(mesh_index, axis=0)
         placed: FloatArray = positions + np.einsum("qij,qj->qi", rotations, middles)
@@ -92,36 +91,15 @@ def _is_convex(corners: FloatArray, normals: FloatArray) -> bool:
     )
 
 
-def mesh_pairs(
-    centers: FloatArray,
-    radii: FloatArray,
-    library: MeshLibrary,
-    mesh_index: IntArray,
-    positions: FloatArray,
-    rotations: FloatArray,
-) -> Overlaps:
-    """Return the overlap of each sphere (`centers` (p, 3), `radii` (p,)) with one placed mesh of the library.
-
-    `mesh_index` (p,) int64 is the mesh's index, `positions` (p, 3) its position; `rotations` (p, 3, 3) turn from its
-    frame to the world's. The result is (volumes (p,), gradients (p, 3), areas (p,)), as in `kernels`. Nothing is
-    checked: a wrong index would read beyond the arrays.
-    """
-    count = len(radii)
-    volumes, gradients, areas = np.empty(count), np.empty((count, 3)), np.empty(count)
-    touched = np.empty(count, dtype=np.int64)
-    arrays, tables = (mesh_index, positions, rotations), library.tables
-    results = volumes, gradients, areas, touched
-    overlap_loop(centers, radii, np.arange(count), *arrays, tables, *results, tables.room())
-    return volumes, gradients, areas
-
-
 def nearest_mesh_pairs(
     centers: FloatArray, library: MeshLibrary, mesh_index: IntArray, positions: FloatArray, rotations: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Return each point's signed distance (p,) in m from one placed mesh, negative inside, and a unit vector (p, 3).
 
     The signed distance falls fastest along this vector. From outside it points towards the nearest point of the
-    surface, from inside away from that point. The arguments are those of `mesh_pairs`; `centers` (p, 3) are the points.
+    surface, from inside away from that point. centers (p, 3): the points. mesh_index (p,) int64: each one's mesh.
+    positions (p, 3): the meshes'; rotations (p, 3, 3) turn from their frames to the world's. Nothing is checked: a
+    wrong index would read beyond the arrays.
     """
     distances, directions = np.empty(len(centers)), np.empty((len(centers), 3))
     nearest_loop(centers, mesh_index, positions, rotations, library.tables, distances, directions)

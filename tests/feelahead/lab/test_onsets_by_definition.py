@@ -14,7 +14,7 @@ from feelahead.lab.reference.looks import compare, looks_of
 from feelahead.lab.reference.onsets_by_definition import GRAZE_M, Defined, defined_onsets, statistical_m
 from feelahead.lab.reference.solids import Solids
 from robot_side.arm.port import GripperPose
-from robot_side.field.field import Along
+from robot_side.field.along import Along
 from robot_side.field.object_class import OBSTACLE, SKIPPED, TARGET, TOUCHABLE
 from robot_side.overlap import Mesh
 from robot_side.surroundings.perceived import PerceivedObjects

@@ -9,7 +9,8 @@ from common.arrays import FloatArray, IntArray
 from common.roles import Role
 from feelahead.lab.reference.onsets_by_definition import Judged, defined_onsets
 from robot_side.arm.port import GripperPose
-from robot_side.field.field import Ahead, Along, Field
+from robot_side.field.along import Along
+from robot_side.field.field import Ahead, Field
 from robot_side.field.object_class import OBSTACLE, SKIPPED, TARGET
 from robot_side.surroundings.perceived import PerceivedObjects
 from robot_side.surroundings.scene_table import scene_table

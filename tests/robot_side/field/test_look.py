@@ -13,7 +13,8 @@ from common.arrays import FloatArray
 from robot_side.arm.port import GripperPose
 from robot_side.enlargement.distance import Uncertainty
 from robot_side.enlargement.kinematic_error import directional_variance, position_covariance
-from robot_side.field.field import Ahead, Along
+from robot_side.field.along import Along
+from robot_side.field.field import Ahead
 from robot_side.field.scratch import Count, Error
 from tests.helpers.field.fields import AHEAD, RADIUS_M, along, ball_pose, look
 from tests.helpers.gripper_poses import free_pose, gripper_pose

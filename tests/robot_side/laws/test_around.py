@@ -12,7 +12,7 @@ from common.reaction import HORIZON_S
 from feelahead.lab.reference.onsets_by_definition import defined_onsets
 from robot_side.arm.port import GripperPose
 from robot_side.enlargement.prediction_errors import PredictionErrors
-from robot_side.field.field import Along
+from robot_side.field.along import Along
 from robot_side.field.object_class import OBSTACLE
 from robot_side.laws.swept import SweptLaw
 from robot_side.surroundings.perceived import PerceivedObjects

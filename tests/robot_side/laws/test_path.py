@@ -11,7 +11,8 @@ from scipy.linalg import expm
 from common.arrays import FloatArray
 from common.reaction import HORIZON_S
 from robot_side.arm.port import GripperPose
-from robot_side.field.field import Ahead, Along
+from robot_side.field.along import Along
+from robot_side.field.field import Ahead
 from robot_side.field.object_class import OBSTACLE
 from robot_side.laws.memory import Memory
 from robot_side.laws.path import SPACING_M

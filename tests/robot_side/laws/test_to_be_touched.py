@@ -5,7 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from robot_side.field.field import Ahead, Along, Field
+from robot_side.field.along import Along
+from robot_side.field.field import Ahead, Field
 from robot_side.field.object_class import OBSTACLE, SKIPPED, TARGET, TOUCHABLE
 from robot_side.field.scratch import TOUCH_STRENGTH, Count
 from robot_side.surroundings.perceived import PerceivedObjects

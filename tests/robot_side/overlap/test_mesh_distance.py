@@ -6,7 +6,8 @@ import pytest
 from common.arrays import FloatArray, IntArray
 from feelahead.lab.reference.meshes import torus
 from robot_side.overlap import Mesh, MeshLibrary
-from robot_side.overlap.meshes.mesh_library import mesh_pairs, nearest_mesh_pairs
+from robot_side.overlap.meshes.mesh_library import nearest_mesh_pairs
+from robot_side.overlap.meshes.mesh_pairs import mesh_pairs
 from tests.helpers.field.nearest_point import nearest_on_tetrahedron
 from tests.helpers.meshes import CUBE_CORNERS, CUBE_TRIANGLES, grid_tetrahedra, round_mesh, surface_of
 

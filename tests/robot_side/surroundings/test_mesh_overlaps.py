@@ -6,7 +6,7 @@ import pytest
 from common.arrays import FloatArray, IntArray
 from feelahead.lab.reference.meshes import torus
 from robot_side.overlap import Mesh, MeshLibrary
-from robot_side.overlap.meshes.mesh_library import mesh_pairs
+from robot_side.overlap.meshes.mesh_pairs import mesh_pairs
 from robot_side.overlap.meshes.mesh_shapes import capsule_mesh
 from robot_side.surroundings.placed_meshes import overlap_one_mesh
 from robot_side.surroundings.scene_table import scene_table
