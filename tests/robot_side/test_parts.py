@@ -10,8 +10,6 @@ import pytest
 
 from common.errors import ConfigurationError
 from common.roles import Role
-from robot_side.compiled.kernel import Compiled
-from robot_side.compiled.warm_up import warm_up
 from robot_side.core import RobotSide
 from robot_side.enlargement.distance import Uncertainty
 from robot_side.enlargement.prediction_errors import BUILT_IN, load_prediction_errors
@@ -180,12 +178,10 @@ def test_a_scene_needs_no_kernels_for_primitives_that_it_lacks(
     needed = {kernel.name.rpartition(".")[2] for kernel in parts.kernels}
     assert needed >= {"look", "sense", "drive"}
     assert ("overlap_one_box" in needed, "overlap_one_tetrahedron" in needed) == (boxes, tetrahedra)
-    # The library's own kernels are not for ticks.
-    assert not needed & {"overlap_boxes", "precise_boxes", "overlap_tetrahedra", "precise_tetrahedra"}
 
 
 @pytest.mark.processes
-def test_a_scene_without_meshes_loads_no_kernel_for_them() -> None:
+def test_a_scene_without_meshes_loads_no_kernel_for_them_and_none_of_the_librarys() -> None:
     program = (
         "import feelahead.both_sides.loopback, robot_side.main\n"
         "from robot_side.core import RobotSide\n"
@@ -199,23 +195,5 @@ def test_a_scene_without_meshes_loads_no_kernel_for_them() -> None:
     )
     done = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, check=True)
     names = done.stdout.split()
-    assert any("overlap.kernels" in name for name in names)
-    assert [name for name in names if "mesh" in name] == []
-
-
-def test_a_tick_among_boxes_runs_no_kernel_that_was_not_made_ready(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    model = planar_arm(tmp_path, world='<geom name="post" type="box" size="0.05 0.05 0.1" pos="0.33 0 0.8"/>')
-    parts = build_parts(RobotSettings(model=model, site="tcp"), 1, "clock")
-    robot, ready = RobotSide(parts), set(parts.kernels)
-    warm_up(kernels=parts.kernels)
-
-    def run(kernel: Compiled, *arguments: Any) -> Any:
-        assert kernel in ready
-        return kernel._dispatcher(*arguments)
-
-    monkeypatch.setattr(Compiled, "__call__", run)
-    for tick in range(50):
-        robot.tick(0.001 * tick)
-    assert robot.figures.summary()["overlap_mm3"]["max"] > 0.0
+    assert any("kinds.box" in name for name in names)
+    assert [name for name in names if "mesh" in name or ".overlap." in name] == []

@@ -14,6 +14,17 @@ from tests.helpers.python_process import LIMIT_S, ended
 
 pytestmark = pytest.mark.processes
 STRANGERS = 1400
+LATE = """
+import sys
+from robot_side import main
+from robot_side.events import Listener
+class Late(Listener):
+    def on_tick(self, tick):
+        from robot_side.overlap import sphere_sphere
+        sphere_sphere((0.0, 0.0, 0.0), 1.0, (0.0, 0.0, 0.0), 1.0)
+main.command(sys.argv[1:], lambda parts: (parts, [Late()]))
+"""
+"""Robot side with a listener of others that uses a part of the library in every tick"""
 FEW = """
 import os, resource, sys
 resource.setrlimit(resource.RLIMIT_NOFILE, (1024, 1024))
@@ -93,3 +104,15 @@ def test_a_driver_with_the_port_of_the_operators_is_named(flag: str) -> None:
     code, _, complaint = ended("-m", "robot_side", f"--bind={address}", f"{flag}={address}")
     assert code == 2
     assert f": {flag}: cannot bind {address}: the port is in use" in complaint
+
+
+def test_a_kernel_that_is_compiled_while_it_runs_is_named_once_and_counted(tmp_path: Path) -> None:
+    summary = tmp_path / "out.json"
+    options = "--bind=tcp://127.0.0.1:0", "--no-cameras", "--duration=1", f"--summary={summary}"
+    code, said, complaint = ended("-c", LATE, *options)
+    assert code == 0, complaint
+    [line] = [line for line in said.splitlines() if "compiled only now" in line]
+    assert "robot_side.overlap.kernels._sphere_loop" in line
+    figures = json.loads(summary.read_text())
+    assert (figures["compiled_late"], figures["errors"]) == (1, [])
+    assert figures["ticks"] > 1

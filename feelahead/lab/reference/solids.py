@@ -109,7 +109,7 @@ def _kinds_of(seen: PerceivedObjects) -> list[_Kind]:
                 seen.mesh_object,
                 mesh,
                 volumes[seen.mesh_index],
-                lambda centers, radii, *placed: mesh_pairs(centers, radii, library, *placed),
+                lambda centers, radii, *placed: mesh_pairs(centers, radii, library.tables, *placed),
                 lambda points, *placed: nearest_mesh_pairs(points, library, *placed)[0],
             )
         )

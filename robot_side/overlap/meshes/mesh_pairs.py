@@ -11,7 +11,6 @@ from robot_side.compiled.stack import on_stack
 from robot_side.compiled.vectors import dot, load, subtract
 from robot_side.overlap.closed_forms.solid import Overlaps
 from robot_side.overlap.meshes.mesh_kernels import PLACED_ARGUMENTS, TABLES, to_mesh, to_world
-from robot_side.overlap.meshes.mesh_library import MeshLibrary
 from robot_side.overlap.meshes.mesh_overlap import mesh_overlap
 from robot_side.overlap.meshes.mesh_tables import MeshTables
 from robot_side.overlap.meshes.tree_queries import is_clear_of
@@ -23,22 +22,21 @@ _scratch = on_stack(SCRATCH)
 def mesh_pairs(
     centers: FloatArray,
     radii: FloatArray,
-    library: MeshLibrary,
+    tables: MeshTables,
     mesh_index: IntArray,
     positions: FloatArray,
     rotations: FloatArray,
 ) -> Overlaps:
-    """Return the overlap of each sphere (`centers` (p, 3), `radii` (p,)) with one placed mesh of the library.
+    """Return the overlap of each sphere (`centers` (p, 3), `radii` (p,)) with one placed mesh.
 
-    mesh_index, positions and rotations: as for `nearest_mesh_pairs`. The result is (volumes (p,), gradients (p, 3),
-    areas (p,)), as in `kernels`. Nothing is checked: a wrong index would read beyond the arrays.
+    tables: of a mesh library. mesh_index, positions and rotations: as for `nearest_mesh_pairs`. The result is (volumes
+    (p,), gradients (p, 3), areas (p,)), as in `kernels`. Nothing is checked: a wrong index would read beyond the arrays.
     """
     count = len(radii)
     volumes, gradients, areas = np.empty(count), np.empty((count, 3)), np.empty(count)
     touched = np.empty(count, dtype=np.int64)
-    arrays, tables = (mesh_index, positions, rotations), library.tables
-    results = volumes, gradients, areas, touched
-    overlap_loop(centers, radii, np.arange(count), *arrays, tables, *results, tables.room())
+    placed, results = (mesh_index, positions, rotations), (volumes, gradients, areas, touched)
+    overlap_loop(centers, radii, np.arange(count), *placed, tables, *results, tables.room())
     return volumes, gradients, areas
 
 

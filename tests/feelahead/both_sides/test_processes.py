@@ -65,6 +65,7 @@ def test_the_demo_runs_both_sides_and_writes_one_summary(tmp_path: Path, more: t
     assert summary["errors"] == []
     assert summary["messages"]["stiffness_received"] > 0
     assert summary["messages"]["motion_received"] > 0
+    assert summary["compiled_late"] == 0
     for direction in ("to_robot", "to_operator"):
         # The emulated delay is a floor; a busy machine's excess is for the benchmark.
         assert summary["delay_ms"][direction]["p50"] >= 20.0

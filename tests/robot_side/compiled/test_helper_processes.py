@@ -83,7 +83,7 @@ def test_a_process_that_is_killed_leaves_the_rest_to_us(tmp_path: Path, monkeypa
 def test_nothing_goes_on_compiling_for_a_process_that_has_gone(tmp_path: Path) -> None:
     program = (
         "import os\n"
-        "import robot_side.parts\n"
+        "import robot_side.overlap.volumes\n"
         "from robot_side.compiled import helper_processes\n"
         "from robot_side.compiled.kernel import imported_kernels\n"
         "class Announcing(helper_processes.Companion):\n"

@@ -14,6 +14,7 @@ from robot_side.compiled.kernel import (
     Compiled,
     compiled,
     input_array,
+    late_kernels,
     output_array,
 )
 from robot_side.compiled.machine_code import can_keep, keep, kept
@@ -54,6 +55,32 @@ def test_machine_code_of_another_processor_or_version_is_not_run(
         elsewhere.setattr(numba.config, "CPU_NAME", "another")
         assert machine() != here
     assert _kernel().cache_hits == 1
+
+
+def test_a_run_is_told_of_each_kernel_that_is_first_used_late() -> None:
+    early, late, never, last = (compiled(input_array(1), output_array(1))(_double) for _ in range(4))
+    early.prepare()
+    told: list[str] = []
+    arrays = np.ones(2), np.empty(2)
+    with late_kernels(told.append):
+        assert early.address != 0
+        early(*arrays)
+        assert told == []
+        late(*arrays)
+        late(*arrays)
+        assert late.address != 0
+        assert told == [late.name]
+
+    def refuse(name: str) -> None:
+        raise LookupError(name)
+
+    with late_kernels(refuse):
+        for use in (lambda: never(*arrays), lambda: never.address):
+            with pytest.raises(LookupError, match="_double"):
+                use()
+    assert not never.ready
+    last(*arrays)
+    assert told == [late.name]
 
 
 @pytest.mark.parametrize("content", [b"", b"\x80\x05garbage", None])

@@ -106,7 +106,7 @@ def test_a_library_places_each_of_its_meshes() -> None:
     positions = rng.normal(size=(count, 3))
     local, radii = rng.uniform(-1.0, 2.0, (count, 3)), rng.uniform(0.1, 1.0, count)
     centers = np.einsum("nij,nj->ni", rotations, local) + positions
-    volumes, gradients, areas = mesh_pairs(centers, radii, library, index, positions, rotations)
+    volumes, gradients, areas = mesh_pairs(centers, radii, library.tables, index, positions, rotations)
     distances, directions = nearest_mesh_pairs(centers, library, index, positions, rotations)
     for pair in range(count):
         volume, gradient, area = meshes[index[pair]].overlap(local[pair], radii[pair], gradient=True)

@@ -58,7 +58,7 @@ def test_a_mesh_has_the_overlap_of_the_library(name: str, radius_m: float) -> No
     for k, center in enumerate(centers):
         volumes[k] = overlap_one_mesh(table.shapes, 0, *center.tolist(), radius_m, table.meshes, gradients[k])
     placed = np.tile(position, (INT64, 1)), np.tile(rotation, (INT64, 1, 1))
-    expected = mesh_pairs(centers, radii, library, np.zeros(INT64, dtype=np.int64), *placed)
+    expected = mesh_pairs(centers, radii, library.tables, np.zeros(INT64, dtype=np.int64), *placed)
     assert (np.abs(volumes - expected[0])).max() <= EQUAL * 4.0 / 3.0 * np.pi * radius_m**3
     # Right on an edge, the gradient is either face's.
     np.testing.assert_allclose(gradients, expected[1], rtol=0.0, atol=1e-9 * np.pi * radius_m**2)
