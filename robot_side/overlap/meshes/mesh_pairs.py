@@ -30,7 +30,7 @@ def mesh_pairs(
     """Return the overlap of each sphere (`centers` (p, 3), `radii` (p,)) with one placed mesh.
 
     tables: of a mesh library. mesh_index, positions and rotations: as for `nearest_mesh_pairs`. The result is (volumes
-    (p,), gradients (p, 3), areas (p,)), as in `kernels`. Nothing is checked: a wrong index would read beyond the arrays.
+    (p,), gradients (p, 3), areas (p,)), as in `kernels`. Nothing is checked: a wrong index reads beyond the arrays.
     """
     count = len(radii)
     volumes, gradients, areas = np.empty(count), np.empty((count, 3)), np.empty(count)
