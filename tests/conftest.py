@@ -7,9 +7,13 @@ from typing import Any
 import pytest
 from hypothesis import HealthCheck, settings
 
+from common.command.launch import single_threaded_algebra
+
 # The same examples each time, however long the machine takes for one.
 settings.register_profile("here", deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("here")
+
+single_threaded_algebra()
 
 STARTS = {"subprocess.Popen", "os.fork", "os.posix_spawn"}
 FONTS = "fc-list"

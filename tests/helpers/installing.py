@@ -1,34 +1,52 @@
-"""Virtual environments for tests of installation, and commands that run in them."""
+"""Environments for tests of installation. Their packages are links to those of this environment: nothing is fetched."""
 
 import os
 import subprocess
+import sys
 import venv
+from collections.abc import Iterable, Iterator
+from importlib.metadata import Distribution, distribution
 from pathlib import Path
 
+from packaging.requirements import Requirement
 
-def run(*command: str | Path) -> subprocess.CompletedProcess[str]:
-    """Run a command without the variables by which it would find the packages of the test run."""
+
+def run(*command: str | Path, **variables: str) -> subprocess.CompletedProcess[str]:
+    """Run a command, with these environment variables, without those by which it would find the test run's packages."""
     environment = {name: value for name, value in os.environ.items() if name not in {"PYTHONPATH", "VIRTUAL_ENV"}}
     return subprocess.run(
-        [str(part) for part in command], capture_output=True, text=True, timeout=1200, env=environment, check=False
+        [str(part) for part in command],
+        capture_output=True,
+        text=True,
+        timeout=1200,
+        env=environment | variables,
+        check=False,
     )
 
 
-def wanted(wheel: Path, extra: str = "") -> str:
-    """Return pip's requirement for the wheel with an extra; without one if `extra` is empty."""
-    return f"feelahead{extra and f'[{extra}]'} @ {wheel.as_uri()}"
+def installed(wheel: Path, folder: Path) -> Path:
+    """Install the wheel alone in a new environment; return its Python."""
+    venv.create(folder, symlinks=True)
+    python = folder / "bin" / "python"
+    command = (sys.executable, "-m", "pip", "--python", python, "install", "-q", "--no-index", "--no-deps", wheel)
+    put = run(*command)
+    assert put.returncode == 0, put.stderr
+    return python
 
 
-def installed(extra: str, wheel: Path, constraints: Path, folder: Path) -> Path:
-    """Install the wheel with this one extra, or with none, in a new environment; return its bin folder."""
-    venv.create(folder, with_pip=True)
-    install = run(folder / "bin/python", "-m", "pip", "install", "-q", "-c", constraints, wanted(wheel, extra))
-    assert install.returncode == 0, install.stderr
-    return folder / "bin"
+def link_packages(project: Distribution, extra: str, folder: Path) -> None:
+    """Link all packages that a project needs with this extra, directly or not; AssertionError for a wrong version."""
+    folder.mkdir()
+    for package in {one.name: one for one in _needed(project, {extra})}.values():
+        for name in {file.parts[0] for file in package.files or ()} - {"..", "__pycache__"}:
+            (folder / name).symlink_to(Path(str(package.locate_file(name))))
 
 
-def absent(bin_folder: Path, *modules: str) -> None:
-    """Assert that none of these modules can be imported in an environment."""
-    for module in modules:
-        found = run(bin_folder / "python", "-c", f"import {module}")
-        assert "ModuleNotFoundError" in found.stderr, f"{module} is installed"
+def _needed(project: Distribution, extras: Iterable[str]) -> Iterator[Distribution]:
+    for line in project.requires or ():
+        requirement = Requirement(line)
+        if requirement.marker is None or any(requirement.marker.evaluate({"extra": one}) for one in ("", *extras)):
+            package = distribution(requirement.name)
+            assert requirement.specifier.contains(package.version), f"{line}, but {package.version} is installed"
+            yield package
+            yield from _needed(package, requirement.extras)

@@ -1,18 +1,17 @@
-"""The wheel installs and its commands run, in separate environments: with each extra by itself, and with none."""
+"""The wheel installs and its commands run: with each extra by itself, and with none."""
 
 import json
-import re
 import sys
 import zipfile
-from collections.abc import Iterable
+from importlib.metadata import PathDistribution
 from pathlib import Path
 
 import pytest
 
-from tests.helpers.installing import absent, installed, run, wanted
+from tests.helpers.installing import installed, link_packages, run
 from tests.helpers.repository import ROOT
 
-pytestmark = [pytest.mark.install, pytest.mark.xdist_group("base")]
+pytestmark = [pytest.mark.install, pytest.mark.xdist_group("wheel")]
 
 PACKAGES = ("common", "feelahead", "operator_side", "robot_side")
 TELLING = {
@@ -21,35 +20,64 @@ TELLING = {
     "robot_side/drivers/mujoco/assets/arm.xml",
     "operator_side/dualsense/hid/release_watchdog.py",
 }
-EXTRAS = {
-    "record": {"foxglove-sdk", "mcap"},
-    "bench": {"mpmath", "overlap"},
-    "experiments": {"matplotlib", "pyarrow", "distributed"},
+MODULES = {
+    "": "",
+    "robot": "mujoco numba simplejpeg",
+    "operator": "hid hidraw viser trimesh",
+    "video": "av",
+    "record": "foxglove mcap.reader mcap.writer",
+    "bench": "mpmath overlap",
+    "experiments": "matplotlib pyarrow distributed",
 }
-OF_THE_SIDES = {"mujoco-core", "mujoco", "numba", "simplejpeg", "hidapi", "viser"}
+"""Modules that can be imported with each extra, and with no other"""
+COMMANDS = {
+    "": {
+        "feelahead --help": "",
+        "feelahead demo --help": "",
+        "feelahead keys make robot --folder {folder}/keys": "",
+        "feelahead bench --list": "",
+        "feelahead try --list": "",
+        "feelahead virtual-dualsense --help": "",
+        "feelahead calibrate --device simulated": "",
+        "feelahead-operator --help": "",
+        "feelahead-operator --device simulated --duration 0.5 --status none": "",
+        "feelahead-robot": "pip install '.[robot]'",
+        "feelahead demo --duration 1": "pip install '.[robot]'",
+        "feelahead bench overlap": "pip install '.[robot,experiments,bench]'",
+        "feelahead try haptics": "pip install '.[robot,operator]'",
+        "feelahead-operator --device hid --duration 0.5": "hidapi",
+    },
+    "robot": {"feelahead-robot --bind tcp://127.0.0.1:0 --duration 0.5 --status none": ""},
+    "operator": {"feelahead-operator --connect tcp://127.0.0.1:9 --device simulated --duration 0.5": ""},
+}
+"""Commands by extra, and what each that needs another extra says"""
+RUNS = """
+import contextlib, importlib, importlib.metadata, importlib.util, io, json, sys
+present, absent, commands = json.loads(sys.argv[1])
+answers = [[module for module in absent if importlib.util.find_spec(module)]]
+mains = {one.name: one.load() for one in importlib.metadata.distribution("feelahead").entry_points}
+for command in commands:
+    sys.argv, said = command.split(), io.StringIO()
+    with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(said):
+        try:
+            mains[sys.argv[0]]()
+        except SystemExit as end:
+            answers.append([end.code or 0, said.getvalue()])
+for module in present:
+    importlib.import_module(module)
+print(json.dumps(answers))
+"""
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return built(ROOT, tmp_path_factory.mktemp("wheel"))
 
 
-@pytest.fixture(scope="session")
-def constraints(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """File with the versions of the lock, without hashes: with these, pip would demand one for the new wheel, too."""
-    pins = re.findall(r"^[a-z0-9][^\s\\]*==[^\\]*", (ROOT / "requirements.lock").read_text(), flags=re.MULTILINE)
-    assert len(pins) > 50
-    path = tmp_path_factory.mktemp("constraints") / "constraints.txt"
-    path.write_text("\n".join(pin.strip() for pin in pins) + "\n")
-    return path
-
-
 @pytest.fixture(scope="module")
-def base(wheel: Path, constraints: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Bin folder of an environment in which the wheel is installed without extras."""
-    bin_folder = installed("", wheel, constraints, tmp_path_factory.mktemp("base"))
-    absent(bin_folder, "mujoco", "numba", "hid", "hidraw", "viser", "mcap", "matplotlib", "pyarrow")
-    return bin_folder
+def python(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Python of an environment in which only the wheel is installed."""
+    return installed(wheel, tmp_path_factory.mktemp("base"))
 
 
 def built(source: Path, folder: Path) -> Path:
@@ -79,79 +107,28 @@ def test_the_wheel_holds_the_packages_and_nothing_else_and_so_does_the_sdists(wh
     assert content(built(next(tmp_path.glob("*.tar.gz")), tmp_path / "again")) == held
 
 
-@pytest.mark.parametrize(
-    "arguments",
-    [
-        ["feelahead", "--help"],
-        ["feelahead", "--version"],
-        ["feelahead", "demo", "--help"],
-        ["feelahead", "keys", "make", "robot", "--folder", "{tmp}/keys"],
-        ["feelahead", "bench", "--list"],
-        ["feelahead", "try", "--list"],
-        ["feelahead", "virtual-dualsense", "--help"],
-        ["feelahead", "calibrate", "--device", "simulated"],
-        ["feelahead-operator", "--help"],
-        ["feelahead-operator", "--device", "simulated", "--duration", "0.5", "--status", "none"],
-    ],
-    ids=" ".join,
-)
-def test_what_works_without_extras(base: Path, tmp_path: Path, arguments: list[str]) -> None:
-    program, *rest = arguments
-    ended = run(base / program, *(word.replace("{tmp}", str(tmp_path)) for word in rest))
+@pytest.mark.parametrize("extra", MODULES)
+def test_what_works_with_an_extra_alone_and_what_needs_another_says_which(
+    python: Path, tmp_path: Path, extra: str
+) -> None:
+    [metadata] = python.parents[1].glob("lib/python*/site-packages/feelahead-*.dist-info")
+    link_packages(PathDistribution(metadata), extra, tmp_path / "packages")
+    present = MODULES[extra].split()
+    absent = {module for name, modules in MODULES.items() if name != extra for module in modules.split()}
+    said = {command.replace("{folder}", str(tmp_path)): words for command, words in COMMANDS.get(extra, {}).items()}
+    asked = json.dumps([present, sorted(module.partition(".")[0] for module in absent), [*said]])
+    ended = run(python, "-P", "-c", RUNS, asked, PYTHONPATH=str(tmp_path / "packages"))
     assert (ended.returncode, ended.stderr) == (0, "")
+    others, *answers = json.loads(ended.stdout)
+    assert others == []
+    for (command, words), (code, complaint) in zip(said.items(), answers, strict=True):
+        assert code == (2 if words else 0), (command, complaint)
+        assert len(complaint.splitlines()) == (1 if words else 0), (command, complaint)
+        assert words in complaint, command
 
 
-@pytest.mark.parametrize(
-    ("command", "said"),
-    [
-        ("feelahead-robot", "pip install '.[robot]'"),
-        ("feelahead demo --duration 1", "pip install '.[robot]'"),
-        ("feelahead bench overlap", "pip install '.[robot,experiments,bench]'"),
-        ("feelahead try haptics", "pip install '.[robot,operator]'"),
-        ("feelahead-operator --device hid --duration 0.5", "hidapi"),
-    ],
-)
-def test_what_needs_an_extra_says_which(base: Path, command: str, said: str) -> None:
-    program, *rest = command.split()
-    ended = run(base / program, *rest)
-    assert ended.returncode == 2
-    [line] = ended.stderr.splitlines()
-    assert said in line
-
-
-def test_the_robot_side_alone(wheel: Path, constraints: Path, tmp_path: Path) -> None:
-    bin_folder = installed("robot", wheel, constraints, tmp_path / "robot")
-    absent(bin_folder, "hid", "hidraw", "viser")
-    ended = run(bin_folder / "feelahead-robot", "--bind", "tcp://127.0.0.1:0", "--duration", "0.5", "--status", "none")
-    assert (ended.returncode, ended.stderr) == (0, "")
-
-
-def test_the_operator_side_alone(wheel: Path, constraints: Path, tmp_path: Path) -> None:
-    bin_folder = installed("operator", wheel, constraints, tmp_path / "operator")
-    absent(bin_folder, "mujoco", "numba", "simplejpeg")
-    program = bin_folder / "feelahead-operator"
-    ended = run(program, "--connect", "tcp://127.0.0.1:9", "--device", "simulated", "--duration", "0.5")
-    assert (ended.returncode, ended.stderr) == (0, "")
-
-
-@pytest.mark.parametrize("extra", EXTRAS)
-def test_an_extra_can_be_had_alone(base: Path, wheel: Path, constraints: Path, tmp_path: Path, extra: str) -> None:
-    """The extra installs in the locked versions, and without packages that only other extras need."""
-    report = tmp_path / "report.json"
-    install = (base / "python", "-m", "pip", "install", "-q", "-c", constraints)
-    tried = run(*install, "--dry-run", "--report", report, wanted(wheel, extra))
-    assert tried.returncode == 0, tried.stderr
-    names = normalised(one["metadata"]["name"] for one in json.loads(report.read_text())["install"])
-    assert names >= EXTRAS[extra]
-    assert not names & OF_THE_SIDES
-    if extra == "record":  # Small enough for a real installation, beside the base.
-        beside = tmp_path / "record"
-        put = run(*install, "--no-deps", "--target", beside, *names - {"feelahead"})
-        assert put.returncode == 0, put.stderr
-        code = f"import sys; sys.path.append({str(beside)!r}); import foxglove, mcap.reader, mcap.writer"
-        imported = run(base / "python", "-c", code)
-        assert (imported.returncode, imported.stderr) == (0, "")
-
-
-def normalised(names: Iterable[str]) -> set[str]:
-    return {re.sub(r"[-_.]+", "-", name).lower() for name in names}
+def test_its_commands_are_programs(python: Path) -> None:
+    [metadata] = python.parents[1].glob("lib/python*/site-packages/feelahead-*.dist-info")
+    for one in PathDistribution(metadata).entry_points:
+        ended = run(python.with_name(one.name), "--version")
+        assert (ended.returncode, ended.stdout.split()[0]) == (0, one.name)
