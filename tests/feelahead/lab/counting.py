@@ -1,4 +1,4 @@
-"""Question for tests of the engine, whose cells need no time; files can make cells wait, fail or be killed."""
+"""Question for tests of the engine, whose cells need no time; files can hold cells, make them fail or kill them."""
 
 import os
 import signal
@@ -20,19 +20,21 @@ class Counting(Sweep):
     numbers: tuple[int, ...] = (1, 2, 3)
     folder: str = ""
     """Folder in which each cell writes a file. A file with a cell's name says what the cell must do: `kill`, `fail` or
-    `refuse`."""
-    wait_s: float = 0.0
+    `refuse`. While there is a file `hold-NUMBER`, the cells of this number do not end."""
 
 
 @dataclass(frozen=True)
 class Cell:
     number: int
     folder: str
-    wait_s: float
 
 
 def cells(settings: Counting) -> Iterator[Cell]:
-    yield from (Cell(number, settings.folder, settings.wait_s) for number in settings.numbers)
+    yield from (Cell(number, settings.folder) for number in settings.numbers)
+
+
+def held(folder: Path, number: int) -> Path:
+    return folder / f"hold-{number}"
 
 
 def run(cell: Cell, seed: int) -> Iterator[Row]:
@@ -46,8 +48,8 @@ def run(cell: Cell, seed: int) -> Iterator[Row]:
             raise FeelaheadError("as asked")
         if asked == "refuse":
             raise ConfigurationError("as asked")
-    if cell.wait_s:
-        signal.sigtimedwait((), cell.wait_s)
+    while cell.folder and held(Path(cell.folder), cell.number).exists():
+        signal.sigtimedwait((), 0.02)
     drawn = generator(cell.number, seed).random(2)
     yield from (
         {"part": part, "value": float(value), "none": None, "parts": [1, 2]} for part, value in enumerate(drawn)

@@ -24,7 +24,9 @@ from feelahead.lab.intervals import mcnemar_p, mean_interval, share_interval, st
 from feelahead.lab.journal import Journal
 from feelahead.lab.sweep import ask, generator, sweep
 from tests.feelahead.lab import counting
-from tests.feelahead.lab.counting import QUESTION, TIMED, Cell, Counting
+from tests.feelahead.lab.counting import QUESTION, TIMED, Cell, Counting, held
+from tests.helpers.machines.waiting import wait_until
+from tests.helpers.python_process import LIMIT_S
 from tests.helpers.repository import ROOT
 
 _GRID = ("--numbers", "1", "2", "3", "4", "--seeds", "3")
@@ -42,13 +44,17 @@ def expected(tmp_path_factory: pytest.TempPathFactory) -> bytes:
     return _asked(tmp_path_factory.mktemp("expected"), "--workers", "1")
 
 
+def _lines(journal: Path) -> int:
+    return journal.read_bytes().count(b"\n") if journal.exists() else 0
+
+
 def _without_folder(content: bytes) -> list[list[str]]:
     return [[row[0], *row[2:]] for row in csv.reader(content.decode().splitlines())]
 
 
 def test_rows_stand_in_the_order_of_the_grid_with_cells_and_seeds_as_columns(expected: bytes) -> None:
     rows = list(csv.DictReader(expected.decode().splitlines()))
-    assert list(rows[0]) == ["number", "folder", "wait_s", "seed", "part", "value", "none"]
+    assert list(rows[0]) == ["number", "folder", "seed", "part", "value", "none"]
     keys = [(int(row["number"]), int(row["seed"]), int(row["part"])) for row in rows]
     assert keys == sorted(keys)
     assert len(keys) == 4 * 3 * 2
@@ -58,7 +64,7 @@ def test_a_cell_draws_the_same_numbers_whatever_else_the_grid_holds(tmp_path: Pa
     path = tmp_path / "rows.csv"
     assert ask(QUESTION, ["--numbers", "3", "--seed", "1", "--workers", "1", "--csv", str(path)]) == 0
     assert set(path.read_text().splitlines()[1:]) < set(expected.decode().splitlines())
-    assert generator(Cell(1, "", 0.0), 0).random() != generator(Cell(2, "", 0.0), 0).random()
+    assert generator(Cell(1, ""), 0).random() != generator(Cell(2, ""), 0).random()
 
 
 @settings(max_examples=60, deadline=None)
@@ -191,7 +197,7 @@ def test_the_example_of_the_readme_runs_and_is_short(tmp_path: Path, capsys: pyt
     assert len(code.splitlines()) <= 40
     path = tmp_path / "reordered_example.py"
     path.write_text(code)
-    assert try_out([str(path), "--seeds", "2", "--csv", str(tmp_path / "rows.csv")]) == 0
+    assert try_out([str(path), "--seeds", "2", "--workers", "1", "--csv", str(tmp_path / "rows.csv")]) == 0
     assert "overtaken, of 1000" in capsys.readouterr().out
     rows = list(csv.DictReader((tmp_path / "rows.csv").read_text().splitlines()))
     assert [row["overtaken"] == "0" for row in rows] == [True, True] + [False] * 6
@@ -241,8 +247,7 @@ def _dask(workers: int) -> Iterator[tuple[str, list["subprocess.Popen[str]"]]]:
 def test_a_worker_that_is_killed_leaves_what_is_finished(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "3-2").write_text("kill")
     rows = tmp_path / "rows.csv"
-    folder = ["--folder", str(tmp_path), "--wait-s", "0.05"]
-    assert ask(QUESTION, [*_GRID, *folder, "--workers", "2", "--csv", str(rows)]) == 1
+    assert ask(QUESTION, [*_GRID, "--folder", str(tmp_path), "--workers", "2", "--csv", str(rows)]) == 1
     said = capsys.readouterr()
     finished = len(rows.read_text().splitlines()) - 1
     assert 0 < finished < 24
@@ -255,74 +260,69 @@ def test_a_worker_that_is_killed_leaves_what_is_finished(tmp_path: Path, capsys:
     )
 
 
-@pytest.mark.parametrize("journal", [True, False])
 @pytest.mark.processes
-def test_ctrl_c_ends_with_130_and_says_how_to_go_on(tmp_path: Path, expected: bytes, journal: bool) -> None:
+def test_ctrl_c_ends_with_130_and_says_how_to_go_on(tmp_path: Path, expected: bytes) -> None:
     rows, kept = tmp_path / "rows.csv", tmp_path / "journal"
-    resume = ["--resume", str(kept)] if journal else []
-    grid = [*_GRID, "--folder", str(tmp_path), "--wait-s", "0.2", *resume, "--csv", str(rows)]
+    grid = [*_GRID, "--folder", str(tmp_path), "--resume", str(kept), "--csv", str(rows)]
+    held(tmp_path, 4).touch()
     with _drive([*grid, "--workers", "2"]) as driver:
-        while not (tmp_path / "2-0").exists():
-            assert driver.poll() is None
+        wait_until("a cell", lambda: _lines(kept) > 1, LIMIT_S)
         driver.send_signal(signal.SIGINT)
-        _, complaint = driver.communicate(timeout=60.0)
+        _, complaint = driver.communicate(timeout=LIMIT_S)
     assert driver.returncode == 130
     [line] = complaint.splitlines()
-    goes_on = f"to continue, run the same command with --resume {kept}" if journal else "with --resume FILE.jsonl"
     assert re.search(r": interrupted; \d+ of 12 runs are finished; \d+ runs are left; ", line)
-    assert goes_on in line
+    assert f"to continue, run the same command with --resume {kept}" in line
     assert rows.exists()
-    if journal:
-        assert _without_folder(_asked(tmp_path, *grid[len(_GRID) : -2])) == [
-            [*row[:1], "0.2" if row[1] == "0.0" else row[1], *row[2:]] for row in _without_folder(expected)
-        ]
+    held(tmp_path, 4).unlink()
+    assert _without_folder(_asked(tmp_path, *grid[len(_GRID) : -2])) == _without_folder(expected)
 
 
 @pytest.mark.processes
-@pytest.mark.parametrize("victim", ["driver", "worker", "scheduler"])
-def test_a_killed_cluster_or_driver_costs_no_row(tmp_path: Path, expected: bytes, victim: str) -> None:
-    journal, slow = tmp_path / "journal", ["--wait-s", "0.1"]
-    arguments = [*_GRID, *slow, "--resume", str(journal)]
-    with _dask(2) as (address, (scheduler, worker, _)):
-        driver = _drive([*arguments, "--scheduler", address])
-        while not journal.exists() or journal.read_bytes().count(b"\n") < 4:
-            assert driver.poll() is None
-        {"driver": driver, "worker": worker, "scheduler": scheduler}[victim].send_signal(signal.SIGKILL)
-        _, complaint = driver.communicate(timeout=60.0)
-        assert driver.returncode == {"driver": -signal.SIGKILL, "worker": 0, "scheduler": 1}[victim], complaint
-        assert victim != "scheduler" or "the scheduler or its workers are gone; " in complaint
-    with _dask(2) as (address, _):
-        resumed = _asked(tmp_path, *slow, "--resume", str(journal), "--scheduler", address)
-    assert resumed.replace(b",0.1,", b",0.0,") == expected
+def test_whatever_is_killed_costs_no_row_and_a_file_of_ones_own_runs_on_a_cluster_that_does_not_have_it(
+    tmp_path: Path, expected: bytes
+) -> None:
+    def begun(journal: str) -> "subprocess.Popen[str]":
+        """Start a run, or go on with it; return it once it has noted another cell."""
+        path = tmp_path / journal
+        before = max(_lines(path), 1)
+        driver = _drive([*_GRID, "--folder", str(tmp_path), "--resume", str(path), "--scheduler", address])
+        wait_until("a cell", lambda: _lines(path) > before, LIMIT_S)
+        return driver
 
+    def ended(driver: "subprocess.Popen[str]") -> tuple[int, str]:
+        _, complaint = driver.communicate(timeout=LIMIT_S)
+        return driver.returncode, complaint
 
-@pytest.mark.processes
-def test_a_file_of_ones_own_runs_on_a_cluster_that_does_not_have_it(tmp_path: Path, expected: bytes) -> None:
     shutil.copy(counting.__file__, tmp_path / "mine_counted.py")
-    with _dask(2) as (address, _):
-        for round_s in ("0", "0.01"):  # A cluster accepts the same file twice.
-            call = [
-                "try",
-                "./mine_counted.py",
-                *_GRID,
-                "--wait-s",
-                round_s,
-                "--scheduler",
-                address,
-                "--csv",
-                "rows.csv",
-            ]
-            asked = subprocess.run(
-                [sys.executable, "-m", "feelahead", *call],
-                cwd=tmp_path,
-                env={**os.environ, "PYTHONPATH": str(ROOT)},
-                capture_output=True,
-                text=True,
-                timeout=120.0,
-                check=False,
-            )
-            assert (asked.returncode, asked.stderr) == (0, "")
-    assert (tmp_path / "rows.csv").read_bytes().replace(b",0.01,", b",0.0,") == expected
+    with _dask(2) as (address, (scheduler, worker, _)):
+        call = [sys.executable, "-m", "feelahead", "try", "./mine_counted.py", *_GRID, "--scheduler", address]
+        for _ in range(2):  # A cluster accepts the same file twice.
+            surroundings = {**os.environ, "PYTHONPATH": str(ROOT)}
+            with subprocess.Popen(
+                [*call, "--csv", "rows.csv"], cwd=tmp_path, env=surroundings, stderr=subprocess.PIPE, text=True
+            ) as own:
+                assert ended(own) == (0, "")
+            assert (tmp_path / "rows.csv").read_bytes() == expected
+        held(tmp_path, 4).touch()
+        driver = begun("one")
+        driver.kill()
+        assert ended(driver)[0] == -signal.SIGKILL
+        held(tmp_path, 4).rename(held(tmp_path, 3))
+        driver = begun("one")
+        worker.kill()
+        held(tmp_path, 3).unlink()
+        assert ended(driver) == (0, "")
+        held(tmp_path, 4).touch()
+        driver = begun("two")
+        scheduler.kill()
+        code, complaint = ended(driver)
+        assert code == 1
+        assert "the scheduler or its workers are gone; " in complaint
+        held(tmp_path, 4).unlink()
+    for journal in ("one", "two"):
+        resumed = _asked(tmp_path, "--folder", str(tmp_path), "--resume", str(tmp_path / journal), "--workers", "1")
+        assert _without_folder(resumed) == _without_folder(expected)
 
 
 @pytest.mark.processes

@@ -81,3 +81,16 @@ def test_the_first_person_sees_the_fingers(model: str, tmp_path: Path) -> None:
 def _green_columns(image: Image) -> np.ndarray:
     red, green, blue = (image[:, :, channel].astype(float) for channel in range(3))
     return np.asarray(((green > 1.4 * red) & (green > 1.4 * blue) & (green > 30.0)).any(axis=0))
+
+
+def test_a_machine_that_cannot_render_is_told_what_helps(monkeypatch: pytest.MonkeyPatch) -> None:
+    # PyOpenGL accepts only this platform, which no machine has.
+    monkeypatch.setenv("EGL_PLATFORM", "none")
+    monkeypatch.setenv("__EGL_VENDOR_LIBRARY_FILENAMES", "/nonexistent.json")
+    with pytest.raises(pytest.skip.Exception) as skipped, picture_taker(load_scene()) as taker:
+        pytest.skip(f"OpenGL is there all the same: {taker.ready}")
+    reason = str(skipped.value)
+    if "all the same" in reason:
+        pytest.skip(reason)
+    for said in ("egl: ", "osmesa: ", "apt-get install libegl1"):
+        assert said in reason

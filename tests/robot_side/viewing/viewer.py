@@ -1,10 +1,11 @@
 """Viewer of a real robot side: sends Hello and Watch messages, and receives the views."""
 
 import contextlib
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Final, TypeVar
 
 from common.clock import MonotonicClock, clock_domain
 from common.protocol.codec import VIEW_MAXIMUM_BYTES, decode, decode_view, encode
@@ -14,19 +15,26 @@ from common.protocol.view_messages import SCENE_TOPIC, VIDEO_TOPIC, AnyViewMessa
 from common.rate.pieces import PIECE, Joining
 from common.sockets.operator import OperatorSockets
 
-_WATCH_PERIOD_S = 0.25
-_COMPANION = b"robot_side.viewing.companion"
+LIMIT_S: Final = 600.0
+"""Time limit in seconds, long enough for a busy machine"""
+_WATCH_PERIOD_S: Final = 0.25
+_COMPANION: Final = b"robot_side.viewing.companion"
+_CLOCK: Final = MonotonicClock()
+View = TypeVar("View")
 
 
 @dataclass
 class Seen:
-    """Messages received in some time. Ages are those on arrival, by the clock that all processes share."""
+    """Messages received in some time, whose stamps are by the clock that all processes share."""
 
-    began_s: float
-    ended_s: float = 0.0
     views: list[tuple[float, AnyViewMessage]] = field(default_factory=list)
     """(time of arrival, message) of each view message"""
-    stiffness_ages_s: list[float] = field(default_factory=list)
+    fields: int = 0
+    """Number of stiffness messages"""
+
+    def of(self, kind: type[View]) -> list[View]:
+        """Return the view messages of this kind."""
+        return [message for _, message in self.views if isinstance(message, kind)]
 
 
 class Viewer:
@@ -37,49 +45,39 @@ class Viewer:
         self._joining = {topic: Joining(VIEW_MAXIMUM_BYTES) for topic in (VIDEO_TOPIC, SCENE_TOPIC)}
         self._end = LinkEnd("operator", epoch, clock_domain())
 
-    def say(self, now_s: float, what: Mapping[str, Any]) -> None:
-        """Ask for the views in `what`: overview, first_person, scene. Views not asked for are no longer sent."""
-        self._sockets.send(encode(self._end.hello(now_s)))
-        self._sockets.send(encode(Watch(self._end.stamp(now_s), **what)))
+    def look_until(self, enough: Callable[[Seen], object], **what: Any) -> Seen:
+        """Ask for the views in `what` and receive until `enough` is true of all that came; return it.
 
-    def take(self, seen: Seen, now_s: float) -> None:
-        """Receive all messages that have arrived, into `seen`."""
+        what: overview, first_person, scene, lacks. Views not asked for are no longer sent.
+        """
+        seen, said_s, end_s = Seen(), -math.inf, _CLOCK.now() + LIMIT_S
+        while not enough(seen):
+            now_s = _CLOCK.now()
+            assert now_s < end_s, f"not within {LIMIT_S} s: {what}"
+            if now_s >= said_s + _WATCH_PERIOD_S:
+                said_s = now_s
+                self._sockets.send(encode(self._end.hello(now_s)))
+                self._sockets.send(encode(Watch(self._end.stamp(now_s), **what)))
+            self._sockets.wait(0.01)
+            self._take(seen)
+        return seen
+
+    def _take(self, seen: Seen) -> None:
         for payload in self._sockets.receive():
             message: Any = decode(payload)
             if isinstance(message, StiffnessUpdate):
-                seen.stiffness_ages_s.append(now_s - message.header.sent_s)
+                seen.fields += 1
             elif isinstance(message, Hello):
-                self._end.arrived(message, now_s)
+                self._end.arrived(message, _CLOCK.now())
         for topic, payload in self._sockets.receive_view():
             of, is_piece, _ = topic.partition(PIECE)
             whole = self._joining[of].take(payload) if is_piece else payload
             if whole is not None:
-                seen.views.append((now_s, decode_view(whole)))
-
-    def wait(self, seconds: float) -> None:
-        """Wait until a message comes, at most `seconds`."""
-        self._sockets.wait(seconds)
+                seen.views.append((_CLOCK.now(), decode_view(whole)))
 
     def close(self) -> None:
         """Close the sockets."""
         self._sockets.close()
-
-
-def look(viewers: Sequence[Viewer], seconds: float, **what: Any) -> Seen:
-    """Let all viewers receive views for `seconds`; return what the first one receives."""
-    clock = MonotonicClock()
-    next_s = began_s = clock.now()
-    seen, others = Seen(began_s), Seen(began_s)
-    while (now_s := clock.now()) < began_s + seconds:
-        if now_s >= next_s:
-            next_s = now_s + _WATCH_PERIOD_S
-            for viewer in viewers:
-                viewer.say(now_s, what)
-        viewers[0].wait(0.001)
-        for viewer in viewers:
-            viewer.take(seen if viewer is viewers[0] else others, clock.now())
-    seen.ended_s = clock.now()
-    return seen
 
 
 def companion_of(process_id: int) -> int | None:
