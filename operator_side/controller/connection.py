@@ -10,6 +10,7 @@ from common.status.codes import ConnectionState
 from operator_side.controller.feel import Feel
 from operator_side.controller.port import OpenController
 from operator_side.controller.search import BackgroundSearch
+from operator_side.controller.silence import SILENT_S, Silence
 from operator_side.controller.state import ControllerState
 
 BEAT_PERIOD_S: Final = 0.05
@@ -22,6 +23,8 @@ process was suspended between reading the clock and the beat."""
 LOOK_PERIOD_S: Final = 1.0
 """Seconds between searches, and from a loss to the next search: by then the arm has long stopped"""
 
+_REVIVAL: Final = "press its PS button, bring it nearer, or plug it in again"
+"""Remedies for a silent controller"""
 WITHOUT_ONE: Final = (
     "the robot stops, and no commands are sent until the controller is back: then release its triggers and arm again"
 )
@@ -70,6 +73,7 @@ class Connection:
         self._search = search
         self._listener = listener
         self._guard, self._meanwhile = guard, meanwhile
+        self._silence = Silence()
         self._held = False
         self._beat_s: float | None = None
         self._address: str | None = None
@@ -130,14 +134,20 @@ class Connection:
             self._listener.controller_found(now_s)
 
     def read(self, now_s: float) -> ControllerState | None:
-        """Return the controller's newest state; None without a new state, or without a controller."""
+        """Return the controller's newest state; None without a new state, or without a controller.
+
+        A controller that gives no new state for SILENT_S is lost, too.
+        """
         if self.controller is None:
             return None
         try:
-            return self.controller.device.read(now_s)
+            state = self.controller.device.read(now_s)
+            if self._silence.lasts(now_s, heard=state is not None):
+                raise DeviceError(f"the controller is gone (no new report for {SILENT_S:g} s): {_REVIVAL}")
         except DeviceError as error:
             self._lose(error, now_s)
             return None
+        return state
 
     def write(self, feel: Feel, now_s: float) -> bool:
         """Write to the controller; return False if there is none, or if it was lost by this write."""
@@ -170,7 +180,7 @@ class Connection:
 
     def _connect(self, controller: OpenController, now_s: float) -> None:
         # Hold it before the first write.
-        self._held, self._beat_s = False, None
+        self._held, self._beat_s, self._silence = False, None, Silence()
         if self._guard is not None and controller.path is not None:
             self._held = True
             self._guard.hold(controller.path, controller.release)

@@ -42,9 +42,17 @@ class FakeHandle:
     times_opened: int = 0
     closed: int = 0
     full_mode: bool = False
+    repeats: bool = False
+    """Whether it repeats one report, as a dongle whose controller is off."""
+    sent: int = 0
 
     def report(self, sequence: int = 0) -> bytes:
         return build_input_report(ControllerState(), self.transport, sequence)
+
+    def next_report(self) -> bytes:
+        """Return a report with the next number; the same one if it repeats."""
+        self.sent += 1
+        return self.report(0 if self.repeats else (self.sent - 1) % 256)
 
     def open_path(self, path: bytes) -> None:
         if not self.opens:
@@ -94,7 +102,7 @@ class FakeHandle:
     def _first_report(self) -> bytes:
         if self.transport is BLUETOOTH and not self.full_mode:
             return SIMPLE_REPORT
-        return self.report()
+        return self.next_report()
 
 
 class FakeBackend:

@@ -43,7 +43,7 @@ class PluggedHandle(FakeHandle):
         if timeout_ms == 0 and now_s - self._reported_s < REPORT_PERIOD_S:
             return []
         self._reported_s = now_s
-        return list(self.report()[:max_length])
+        return list(self.next_report()[:max_length])
 
     def write(self, data: bytes) -> int:
         self._look()

@@ -9,6 +9,7 @@ from feelahead.both_sides.loopback import Loopback, LoopbackSettings
 from operator_side.controller.connection import LOOK_PERIOD_S, Connection
 from operator_side.controller.state import Button
 from operator_side.dualsense.hid.finding import Finder
+from operator_side.hands.newest import INTENT_EXPIRES_S
 from operator_side.settings import OperatorSettings
 from robot_side.settings import RobotSettings
 from tests.operator_side.dualsense.simulated_system import SimulatedSystem, VirtualSearch
@@ -24,7 +25,8 @@ RAMP_S = 0.3
 class Run:
     """Run of both sides with a scripted person, whose controller the test can unplug."""
 
-    def __init__(self, link: str = "") -> None:
+    def __init__(self, link: str = "", *, wireless: bool = False) -> None:
+        self.wireless = wireless
         self.both = Loopback(LoopbackSettings(RobotSettings(link=link), OperatorSettings(link=link)))
         self.system = SimulatedSystem()
         self.system.clock = self.both.clock
@@ -32,9 +34,14 @@ class Run:
         self.both.connection = Connection(VirtualSearch(Finder(self.system), lambda: False), self.both.operator)
 
     def unplug(self) -> None:
-        self.system.unplug(PLACE)
+        """Unplug the controller; of a wireless one, switch it off, so that its dongle repeats its last report."""
+        if self.wireless:
+            self.system.off = {PLACE}
+        else:
+            self.system.unplug(PLACE)
 
     def plug_in(self) -> None:
+        self.system.off = set()
         self.system.devices[PLACE] = self.both.device
 
     def let_go_of_the_person(self) -> None:
@@ -64,25 +71,31 @@ class Run:
         return self.both.operator.screen.tool_speed_m_s
 
 
-def advancing(link: str = "") -> Run:
+WIRELESS = pytest.mark.parametrize("wireless", [False, True])
+
+
+def advancing(link: str = "", *, wireless: bool) -> Run:
     """Return a run in which the arm moves and a trigger is stiff."""
-    run = Run(link)
+    run = Run(link, wireless=wireless)
     run.until(lambda: not run.both.device.released, 12.0)
     assert run.state == "armed"
     run.let_go_of_the_person()
     return run
 
 
+@WIRELESS
 @pytest.mark.parametrize("delay_ms", [0, 100])
-def test_unplugged_the_arm_stops_and_stays(delay_ms: int) -> None:
-    run = advancing(f"delay {delay_ms}ms" if delay_ms else "")
+def test_unplugged_the_arm_stops_and_stays(delay_ms: int, wireless: bool) -> None:
+    run = advancing(f"delay {delay_ms}ms" if delay_ms else "", wireless=wireless)
     assert run.speed_m_s > 0.01
     run.unplug()
-    run.wait(1e-3 * delay_ms + 0.01)  # Messages under way still arrive.
+    # Messages under way still arrive; and what a dongle repeats counts as held for 0.1 s.
+    run.wait(1e-3 * delay_ms + 0.01 + (INTENT_EXPIRES_S if wireless else 0.0))
     commands = run.commands
     run.wait(GAP_S)
     assert run.state == "disarmed"
     assert run.both.connection.state is ConnectionState.LOST
+    assert run.both.device.released
     run.wait(1e-3 * delay_ms + RAMP_S)
     assert run.speed_m_s < 1e-3
     run.wait(3.0)
@@ -91,8 +104,9 @@ def test_unplugged_the_arm_stops_and_stays(delay_ms: int) -> None:
     assert run.both.operator.lease is not None, "we still live, and keep the lease by our Hellos"
 
 
-def test_plugged_in_again_it_resumes_disarmed_and_is_armed_on_purpose() -> None:
-    run = advancing()
+@WIRELESS
+def test_plugged_in_again_it_resumes_disarmed_and_is_armed_on_purpose(wireless: bool) -> None:
+    run = advancing(wireless=wireless)
     device = run.both.device
     run.unplug()
     run.wait(1.0)
@@ -113,7 +127,7 @@ def test_plugged_in_again_it_resumes_disarmed_and_is_armed_on_purpose() -> None:
 
 
 def test_a_held_arming_button_arms_nothing_before_a_healthy_second() -> None:
-    run = advancing()
+    run = advancing(wireless=False)
     run.both.device.set_buttons(frozenset({Button.L1, Button.OPTIONS}))
     run.unplug()
     run.wait(0.5)

@@ -111,6 +111,7 @@ def examine() -> list[Finding]:
         *(machine.check_extra(extra, machine.failed_imports(extra)) for extra in machine.EXTRAS),
         controllers.check_permission(is_root=is_root, rules=rules, controllers=seen),
         *seen,
+        *controllers.gamepads_seen(),
         *machine.check_kernels(machine.kernel_facts()),
         *([machine.check_rendering(machine.rendering_troubles())] if "mujoco" not in absent else []),
         *machine.check_realtime(machine.realtime_notes()),

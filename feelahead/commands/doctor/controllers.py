@@ -16,6 +16,7 @@ from operator_side.dualsense.hid.second_writer import PROC, REMEDY, writers_of
 from operator_side.dualsense.hid.udev import RULE_FILE, RULE_FOLDERS, installing_command
 from operator_side.dualsense.reports.input_report import parse_input_report
 from operator_side.dualsense.reports.models import PRODUCT_IDS, SONY_VENDOR_ID
+from operator_side.evdev import pad as evdev
 
 _NAME: Final = "controller"
 
@@ -70,6 +71,16 @@ def controllers_seen() -> list[Finding]:
     return looks + [_other_writer(name, seen.path) for seen in found for name in writers_of(seen.path, PROC)]
 
 
+def gamepads_seen() -> list[Finding]:
+    """Return a finding for each joystick, wheel and gamepad: its layout for --device evdev, or what it lacks."""
+    findings = []
+    for path, pad in evdev.controllers_seen()[0]:
+        said = f"{pad.name} at {path}: {pad.layout or pad.lacks}"
+        findings.append(Finding("gamepad", Verdict.OK if pad.is_pad else Verdict.NOTE, said))
+        pad.close()
+    return findings
+
+
 def udev_rules() -> dict[str, str]:
     """Return the text of each readable file of udev's rules, by its path."""
     paths = [path for folder in RULE_FOLDERS for path in sorted(Path(folder).glob("*.rules"))]
@@ -85,6 +96,7 @@ def _look_at(backend: HidBackend, path: bytes, model: str) -> Finding:
     place = f"{model} at {os.fsdecode(path)}"
     try:
         device = HidDualSense(backend, path)
+        device.check_presence()
     except DeviceError as error:
         said, _, remedy = str(error).partition(": ")
         return Finding(_NAME, Verdict.MISSING, f"{place}: {said}", remedy or None)

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Final, TypeVar
 
-from common.errors import DeviceError, NoDriverError, RemoteProtocolError
+from common.errors import DeviceError, NoDeviceError, NoDriverError, RemoteProtocolError
 from operator_side.controller.feel import Feel
 from operator_side.controller.state import ControllerState
 from operator_side.dualsense.reports.feature_report import (
@@ -16,7 +16,7 @@ from operator_side.dualsense.reports.feature_report import (
     Firmware,
     parse_address,
 )
-from operator_side.dualsense.reports.input_report import parse_input_report
+from operator_side.dualsense.reports.input_report import parse_input_report, stamp_of
 from operator_side.dualsense.reports.output_report import build_output_report
 from operator_side.dualsense.reports.transport import Transport, is_simple_report, transport_of_input
 
@@ -33,6 +33,8 @@ _READ_LENGTH: Final = 128  # longer than any report, so that none is cut
 _MAX_DRAINED: Final = 64  # size of the kernel's hidraw queue; more is left for the next read
 _FIRST_REPORT_MS: Final = 100
 _FIRST_REPORT_ATTEMPTS: Final = 5
+_MOST_REPEATS: Final = 64
+"""Number of equal reports after which a controller counts as absent; a dongle may send each of its own several times"""
 _FEATURE_ATTEMPTS: Final = 3
 """Number of attempts to read a feature report, as radio may garble one (Linux hid-playstation also repeats)"""
 
@@ -78,6 +80,7 @@ class HidDualSense:
 
         On Bluetooth, this also makes the controller send full reports. DeviceError gives the fault and the remedy.
         """
+        self._place = os.fsdecode(path)
         self._reading, self._writing = _open(backend, path)
         try:
             self.identity: Final = _ask(self._reading, path)
@@ -89,6 +92,7 @@ class HidDualSense:
             self._close_handles()
             raise
         self._closed = False
+        self._stamp = stamp_of(self.identity.first_report)
         self._sequence = 0
         self._written = False
         self._released = True
@@ -100,9 +104,10 @@ class HidDualSense:
         return self._released
 
     def read(self, now_s: float) -> ControllerState | None:
-        """Return the state in the newest valid report, without waiting; None if none has come since the last call.
+        """Return the state in the newest valid report, without waiting; None if no new one came since the last call.
 
-        DeviceError if the controller is gone.
+        A report that repeats the one before is not new: a dongle repeats the last report of a controller that is off,
+        for ever. DeviceError if the controller is gone.
         """
         del now_s  # a real controller has its own clock
         self._require_open()
@@ -118,8 +123,33 @@ class HidDualSense:
         for report in map(bytes, reversed(drained)):
             # Bluetooth may have sent simple reports before full ones were requested.
             with contextlib.suppress(RemoteProtocolError):
-                return parse_input_report(report)
+                state, before = parse_input_report(report), self._stamp
+                self._stamp = stamp_of(report)
+                return None if self._stamp == before else state
         return None
+
+    def check_presence(self) -> None:
+        """Wait for a report that does not repeat the first one; if none comes, close and raise NoDeviceError.
+
+        Bluetooth's simple reports are taken for present, as nothing in them shows a repetition. DeviceError if the
+        controller is gone.
+        """
+        left = 0 if self._stamp is None else _MOST_REPEATS
+        try:
+            while left > 0:
+                report = bytes(self._reading.read(_READ_LENGTH, _FIRST_REPORT_MS))
+                if stamp_of(report) not in (None, self._stamp):
+                    return
+                left -= 1 if report else _MOST_REPEATS // _FIRST_REPORT_ATTEMPTS
+        except OSError as error:
+            self.close()
+            raise _gone(str(error)) from error
+        if self._stamp is not None:
+            self.close()
+            raise NoDeviceError(
+                f"the controller at {self._place} repeats one report, as a dongle does whose controller is off or out"
+                " of reach: press its PS button"
+            )
 
     def write(self, feel: Feel, now_s: float) -> None:
         """Send an output report that sets the effects of `feel`; DeviceError if the controller is gone.

@@ -57,20 +57,24 @@ def find_controller(backend: HidBackend, preferred: str | None = None, *, others
 
     A controller that is connected by USB and Bluetooth at once is opened on USB. If `preferred` is given, another
     controller is taken only if `others` is True and every connected controller could be opened. One that could not may
-    be the preferred one, as the system grants permission a moment after a controller appears.
+    be the preferred one, as the system grants permission a moment after a controller appears. A dongle whose controller
+    is off does not count as connected.
     """
-    seen = sightings(backend)
-    if not seen:
-        raise _none_found()
     opened: list[tuple[Sighting, HidDualSense]] = []
     failure: DeviceError | None = None
-    for sighting in seen:
+    absent: NoDeviceError | None = None
+    for sighting in sightings(backend):
         try:
-            opened.append((sighting, HidDualSense(backend, sighting.path)))
+            device = HidDualSense(backend, sighting.path)
+            device.check_presence()
+        except NoDeviceError as error:
+            absent = absent or error
         except DeviceError as error:
             failure = failure or error
-    if failure is not None and not opened:
-        raise failure
+        else:
+            opened.append((sighting, device))
+    if not opened:
+        raise failure or absent or _none_found()
 
     def is_another(one: HidDualSense) -> bool:
         return preferred is not None and one.identity.address != preferred

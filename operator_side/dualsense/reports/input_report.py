@@ -144,6 +144,19 @@ def parse_input_report(report: bytes) -> ControllerState:
     )
 
 
+def stamp_of(report: bytes) -> bytes | None:
+    """Return what a living controller changes in full reports: number, sensor time and hands; None for other reports.
+
+    A controller at rest still changes number and time. Of these an imitation may leave one as it is.
+    """
+    for framing in INPUT_FRAMING.values():
+        if report[:1] == bytes((framing.report_id,)) and len(report) == framing.length:
+            # The byte before the common block has another number on Bluetooth, and is constant on USB.
+            start = framing.start
+            return report[start - 1 : start + 10] + report[start + 27 : start + 31]
+    return None
+
+
 def _checked_transport(report: bytes) -> Transport:
     transport = transport_of_input(report)
     if transport is Transport.BLUETOOTH:

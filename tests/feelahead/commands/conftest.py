@@ -26,7 +26,7 @@ class Played:
         self.now_s += REPORT_S
         self.at_turn()
         state = self.hands(self.now_s)
-        self.handle.waiting = [] if state is None else [build_input_report(state)]
+        self.handle.waiting = [] if state is None else [build_input_report(state, sensor_time_s=self.now_s)]
         return self.now_s
 
 

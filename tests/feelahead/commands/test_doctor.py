@@ -113,11 +113,13 @@ def test_what_cannot_be_imported_or_rendered_is_named_with_the_reason(monkeypatc
 
 def test_controllers_are_looked_at_and_left_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     working, denied = FakeHandle(BLUETOOTH), FakeHandle(opens=False, reason="in use")
-    backend: HidBackend = FakeBackend({0x0CE6: {b"/dev/a": working}, 0x0DF2: {b"/dev/b": denied}})
+    dongle = FakeHandle(repeats=True)
+    backend: HidBackend = FakeBackend({0x0CE6: {b"/dev/a": working}, 0x0DF2: {b"/dev/b": denied, b"/dev/c": dongle}})
     monkeypatch.setattr(controllers, "load_backend", lambda: backend)
-    first, second = controllers.controllers_seen()
+    first, second, third = controllers.controllers_seen()
     about = f"on Bluetooth: {ADDRESS}, firmware 0x0110002a (hardware 0x00000616), battery about "
-    assert (first.verdict, second.verdict) == (OK, MISSING)
+    assert (first.verdict, second.verdict, third.verdict) == (OK, MISSING, MISSING)
+    assert "/dev/c repeats one report" in third.said
     assert first.said.startswith(f"DualSense at /dev/a {about}")
     assert second.said.startswith("DualSense Edge at /dev/b: ")
     assert "in use" in second.said + (second.remedy or "")

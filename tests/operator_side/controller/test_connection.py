@@ -15,6 +15,7 @@ from operator_side.controller.connection import (
 from operator_side.controller.feel import Feel
 from operator_side.controller.port import OpenController
 from operator_side.controller.search import BackgroundSearch
+from operator_side.controller.silence import SILENT_S
 from operator_side.controller.state import ControllerState
 from tests.helpers.felt import feedback
 
@@ -29,11 +30,12 @@ class FakeDevice:
     log: list[str]
     plugged_in: bool = True
     released: bool = True
+    speaks: bool = True
 
     def read(self, now_s: float) -> ControllerState | None:
         del now_s
         self._check()
-        return ControllerState()
+        return ControllerState() if self.speaks else None
 
     def write(self, output: Feel, now_s: float) -> None:
         del output, now_s
@@ -195,6 +197,37 @@ def test_unplugged_it_is_lost_at_once_and_looked_for_a_second_later(world: World
     world.run(5.0)
     assert set(world.search.looks[looks:]) == {"aa"}
     assert world.connection.take_notes() == []
+
+
+def test_without_a_new_state_it_is_lost_as_if_unplugged(world: World) -> None:
+    device = world.plug_in()
+    device.speaks = False
+    world.run(1.0)  # Nothing is expected before the first state.
+    device.speaks = True
+    world.run(PERIOD_S)
+    world.connection.take_notes()
+    device.speaks = False
+    world.run(SILENT_S - PERIOD_S)
+    assert world.connection.state is ConnectionState.CONNECTED
+    world.run(2 * PERIOD_S)
+    assert world.connection.state is ConnectionState.LOST
+    assert world.log[-3:] == ["lost", "close", "let go"]
+    [note] = world.connection.take_notes()
+    assert "no new report for 0.15 s" in note
+    assert "release its triggers and arm again" in note
+    device.speaks = True
+    world.run(LOOK_PERIOD_S + 2 * PERIOD_S)
+    assert world.connection.state is ConnectionState.CONNECTED
+
+
+@pytest.mark.parametrize("stall_s", [0.3, 100.0])
+def test_a_stall_of_ours_is_no_silence_of_the_controller(world: World, stall_s: float) -> None:
+    device = world.connected()
+    for _ in range(5):
+        world.now_s += stall_s
+        for device.speaks in (False, False, True):  # What came meanwhile may be read later.
+            world.run(PERIOD_S)
+    assert world.connection.state is ConnectionState.CONNECTED
 
 
 @pytest.mark.parametrize(

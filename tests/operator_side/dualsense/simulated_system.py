@@ -26,6 +26,7 @@ class SimulatedHandle:
     def __init__(self, system: "SimulatedSystem") -> None:
         self._system = system
         self._path = b""
+        self._repeated_s = -1.0
         self._device: SimulatedDualSense | None = None
 
     def open_path(self, path: bytes) -> None:
@@ -37,12 +38,14 @@ class SimulatedHandle:
         return flag
 
     def read(self, max_length: int, timeout_ms: int = 0) -> list[int]:
-        if timeout_ms > 0:
-            self._system.clock.advance_to(self._system.clock.now() + PERIOD_S)
         try:
-            return list((self._open().read_report(self._system.clock.now()) or b"")[:max_length])
+            report = self._report()
+            if report is None and timeout_ms > 0:
+                self._system.clock.advance_to(self._system.clock.now() + PERIOD_S)
+                report = self._report()
         except DeviceError as error:
             raise OSError("read error") from error
+        return list((report or b"")[:max_length])
 
     def write(self, data: bytes) -> int:
         try:
@@ -62,6 +65,16 @@ class SimulatedHandle:
     def error(self) -> str:
         return "No such file or directory"
 
+    def _report(self) -> bytes | None:
+        """Return a report if there is one; of a controller that is off, its last one, once at each time."""
+        now_s, device = self._system.clock.now(), self._open()
+        if self._path not in self._system.off:
+            self._repeated_s, report = now_s, device.read_report(now_s)
+            self._system.last[self._path] = report or self._system.last.get(self._path, b"")
+            return report
+        before_s, self._repeated_s = self._repeated_s, now_s
+        return self._system.last[self._path] if now_s > before_s else None
+
     def _open(self) -> SimulatedDualSense:
         assert self._device is not None
         if self._system.devices.get(self._path) is not self._device:
@@ -78,11 +91,15 @@ class SimulatedSystem:
     def __init__(self) -> None:
         self.clock = VirtualClock(1.0)
         self.devices: dict[bytes, SimulatedDualSense] = {}
+        self.off: set[bytes] = set()
+        """Dongles whose controller is off or out of reach: they repeat its last report for ever."""
+        self.last: dict[bytes, bytes] = {}
         self.failing = 0
         """Number of next transfers, to any controller, that will fail."""
 
     def unplug(self, path: bytes) -> None:
         """Remove the controller at `path`; without power its triggers are released."""
+        self.off.discard(path)
         self.devices.pop(path).write(RELEASED, self.clock.now())
 
     def transfer(self, device: SimulatedDualSense, report: bytes) -> bool:

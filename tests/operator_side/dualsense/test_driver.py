@@ -2,13 +2,15 @@
 
 import sys
 import types
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from msgspec.structs import replace
 
 from common.errors import DeviceError, NoDriverError
 from operator_side.controller.feel import FREE_TRIGGER, RELEASED, USUAL_LIGHT, WARNING_LIGHT, Feel, Rumble
-from operator_side.controller.state import ControllerState
+from operator_side.controller.state import Button, ControllerState
 from operator_side.dualsense.hid.device import HidDualSense, load_backend
 from operator_side.dualsense.reports.input_report import build_input_report
 from operator_side.dualsense.reports.output_report import parse_output_report
@@ -135,6 +137,31 @@ def test_reading_drains_to_the_newest_good_report(transport: Transport, bad: byt
     handle.plugged_in = False
     with pytest.raises(DeviceError, match=r"gone \(read error\): plug it in"):
         device.read(0.5)
+
+
+HELD = ControllerState(r2=1.0, pressed=frozenset({Button.L1, Button.R2}))
+
+
+@pytest.mark.parametrize(
+    "made",
+    [
+        pytest.param(lambda k: build_input_report(HELD, USB, k % 256), id="an imitation without sensor time"),
+        pytest.param(lambda k: build_input_report(HELD, USB, 7, 0.004 * k), id="an imitation without numbers"),
+        pytest.param(lambda k: build_input_report(HELD, USB, k % 256, 0.004 * k), id="at rest on USB"),
+        pytest.param(lambda k: build_input_report(HELD, BLUETOOTH, 1, 0.004 * k), id="at rest on Bluetooth"),
+        pytest.param(lambda k: build_input_report(replace(HELD, r2=k % 256 / 255)), id="hands that move"),
+    ],
+)
+def test_a_report_is_new_while_number_time_or_hands_move_and_a_repetition_is_not(made: Callable[[int], bytes]) -> None:
+    handle = FakeHandle(waiting=[made(0)])
+    device = open_fake(handle)
+    for k in range(1, 600):  # Numbers have one byte.
+        handle.waiting = [made(k)] * (1 + k % 4)  # A dongle asks more often than its controller sends.
+        assert device.read(0.0) is not None
+        handle.waiting = [made(k)] * (k % 3)
+        assert device.read(0.0) is None
+    handle.waiting = [made(600), made(601), made(601)]  # After a stall of ours.
+    assert device.read(0.0) is not None
 
 
 # Writing

@@ -11,7 +11,7 @@ from operator_side.controller.search import BackgroundSearch, Find
 from operator_side.dualsense.hid.finding import LOOKS_FOR_THE_SAME, Finder, Sighting, find_controller, sightings
 from operator_side.dualsense.hid.udev import RULES
 from operator_side.dualsense.reports.output_report import build_output_report
-from tests.helpers.fake_hid import ADDRESS, BLUETOOTH, USB, FakeBackend, FakeHandle
+from tests.helpers.fake_hid import ADDRESS, BLUETOOTH, SIMPLE_REPORT, USB, FakeBackend, FakeHandle
 
 A, B = b"/dev/hidraw3", b"/dev/hidraw4"
 OTHER = "11:22:33:44:55:66"
@@ -98,6 +98,24 @@ def test_one_that_cannot_be_opened_does_not_hide_another() -> None:
     del backend.found[0x0CE6][B]
     with pytest.raises(DeviceError, match="no permission to open the controller at /dev/hidraw3"):
         find_controller(backend)
+
+
+def test_a_dongle_whose_controller_is_off_is_none() -> None:
+    dongle, other = FakeHandle(repeats=True), FakeHandle(USB, OTHER)
+    backend = FakeBackend({0x0CE6: {A: dongle}})
+    look = Finder(backend)
+    with pytest.raises(NoDeviceError, match=r"hidraw3 repeats one report, .* off or out of reach: press its PS button"):
+        look(None)
+    backend.found[0x0CE6][B] = other
+    for _ in range(LOOKS_FOR_THE_SAME - 1):
+        with pytest.raises(NoDeviceError, match=f"{ADDRESS} is not connected, only: {OTHER}"):
+            look(ADDRESS)
+    assert look(ADDRESS).path == B
+    assert dongle.closed == dongle.times_opened
+    dongle.repeats = False
+    assert look(ADDRESS).path == A
+    silent = FakeHandle(BLUETOOTH, waiting=[SIMPLE_REPORT] * 9)  # Told from nothing, so taken.
+    assert find_controller(FakeBackend({0x0CE6: {A: silent}})).path == A
 
 
 def test_a_place_that_is_listed_for_each_of_its_uses_is_one() -> None:

@@ -89,6 +89,8 @@ class Plugs(RuleBasedStateMachine):
         self.connection.update(now_s)
         now_s = self.now_s  # Opening a controller lets time pass.
         if (state := self.connection.read(now_s)) is not None:
+            controller = self.connection.controller
+            assert controller is None or controller.path not in self.system.off, "a repeated state counts as new"
             self.report_s = now_s
             self.core.read_state(state, now_s)
         for command in (decode(message.payload) for message in self.core.motion(now_s)):
@@ -136,6 +138,12 @@ class Plugs(RuleBasedStateMachine):
         device.read(self.now_s)
         self.system.devices[path.encode()] = device
 
+    @precondition(lambda self: self.system.devices)
+    @rule()
+    def switch_off_or_on(self) -> None:
+        """Switch a controller off, whose dongle then repeats its last report, or all on again."""
+        self.system.off = set() if self.system.off else {min(self.system.devices)}
+
     @rule(turns=st.sampled_from([1, 10, 60, 300]))
     def go_on(self, turns: int) -> None:
         for _ in range(turns):
@@ -152,6 +160,7 @@ class Plugs(RuleBasedStateMachine):
     def arm(self) -> None:
         """End the faults, connect a controller, arm the arm and make the triggers stiff."""
         self.stalled, self.system.failing, self.strength = False, 0, 7
+        self.system.off.clear()
         for _ in range(2000):  # Another controller is taken after three searches.
             self.turn()
             if self.connection.state is ConnectionState.CONNECTED:
