@@ -42,10 +42,13 @@ class Axis(NamedTuple):
         return 0.0 if past <= self.flat else min(past / (self.most - self.least), 1.0)
 
     def deflection(self, value: int | None) -> float:
-        """Return a stick's deflection at `value`, -1 to 1; at rest for None. A range with both signs rests at 0."""
+        """Return a stick's deflection at `value`, -1 to 1; at rest for None. A range with both signs rests at 0.
+
+        Else it rests in the middle, or half a step beside it.
+        """
         middle = 0.0 if self.least < 0 < self.most else (self.least + self.most) / 2
         past = 0.0 if value is None else value - middle
-        if abs(past) <= self.flat:
+        if abs(past) <= self.flat + 0.5:
             return 0.0
         return max(-1.0, min(past / (self.most - middle if past > 0.0 else middle - self.least), 1.0))
 

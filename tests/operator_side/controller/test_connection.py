@@ -207,10 +207,9 @@ def test_without_a_new_state_it_is_lost_as_if_unplugged(world: World) -> None:
     world.run(PERIOD_S)
     world.connection.take_notes()
     device.speaks = False
-    world.run(SILENT_S - PERIOD_S)
-    assert world.connection.state is ConnectionState.CONNECTED
-    world.run(2 * PERIOD_S)
-    assert world.connection.state is ConnectionState.LOST
+    for wait_s, state in ((SILENT_S - PERIOD_S, ConnectionState.CONNECTED), (2 * PERIOD_S, ConnectionState.LOST)):
+        world.run(wait_s)
+        assert world.connection.state is state
     assert world.log[-3:] == ["lost", "close", "let go"]
     [note] = world.connection.take_notes()
     assert "no new report for 0.15 s" in note
