@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Final
 
-WANTED: Final = ("virtio_pci", "9pnet_virtio", "9p", "hid_generic", "hid_playstation", "uhid", "evdev")
+WANTED: Final = ("virtio_pci", "9pnet_virtio", "9p", "hid_generic", "hid_playstation", "uhid", "uinput", "evdev")
 """Kernel modules that the tests need; `module_order` adds their dependencies"""
 RESULT_MARK: Final = "kernel test: exit code "
 """Start of the output line that gives the test program's exit code"""
