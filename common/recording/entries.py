@@ -31,9 +31,9 @@ class Kind(IntEnum):
     """A turn of the robot side, after its STATE and FRAME. Content: f64, stamp, on the operator side's clock, of the
     command that moves the arm; NaN for none."""
     STATE = 4
-    """The arm's measurement (robot_side/recording/inputs.py), if it differs from that of the previous tick."""
+    """The arm's measurement (robot_side/recording/arm_states.py), if it differs from that of the previous tick."""
     FRAME = 5
-    """The camera's frame (robot_side/recording/inputs.py), if it differs from that of the previous tick."""
+    """The camera's frame (robot_side/recording/frames.py), if it differs from that of the previous tick."""
     SEEN = 6
     """The operator side received a view payload that a control message could hold, such as Telemetry. Longer ones,
     which no core uses, are recorded only as messages of kind VIEW (wire.py)."""

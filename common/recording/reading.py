@@ -67,7 +67,7 @@ class Recording:
 
 def open_recording(path: Path) -> Recording:
     """Scan the file at `path`; raises ConfigurationError, in one line, if it is no recording of ours."""
-    require_packages("a recording", "foxglove", "mcap")
+    require_packages("a recording", "mcap")
     from mcap.records import Chunk, DataEnd, Metadata  # noqa: PLC0415
 
     headers: dict[str, Mapping[str, Any]] = {}

@@ -20,7 +20,7 @@ from common.recording.reading import Recording
 from feelahead.recordings.controller import read_value
 from operator_side.controller.feel import Feel
 from operator_side.controller.state import ControllerState
-from robot_side.recording.inputs import unpack_state
+from robot_side.recording.arm_states import unpack_state
 
 JOINED_HZ: Final = 100.0
 _NANOSECONDS: Final = 1e-9

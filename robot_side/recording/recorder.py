@@ -15,7 +15,8 @@ from common.recording.provenance import provenance
 from robot_side.arm.port import ArmState
 from robot_side.compiled.warm_up import kernel_digests
 from robot_side.events import Listener, Tick
-from robot_side.recording.inputs import FramePacker, pack_state
+from robot_side.recording.arm_states import pack_state
+from robot_side.recording.frames import FramePacker
 from robot_side.settings import RobotSettings
 from robot_side.surroundings.perceived import PerceivedObjects
 

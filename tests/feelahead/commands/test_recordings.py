@@ -14,7 +14,8 @@ from common.recording.reading import open_recording
 from common.recording.wire import HEADER, as_json
 from feelahead.commands.demo.command import demo
 from feelahead.commands.recordings import export, plot, replay
-from feelahead.recordings.replay import replay_operator, replay_robot
+from feelahead.recordings.replay_operator import replay_operator
+from feelahead.recordings.replay_robot import replay_robot
 from tests.helpers.refusal import refusal
 
 COMMANDS = (replay, export, plot)

@@ -23,10 +23,11 @@ from common.recording.reading import Recording, open_recording
 from common.silence import KEEP_ALIVE_S
 from feelahead.both_sides.loopback import Loopback
 from feelahead.commands.recordings import replay
-from feelahead.recordings import replay as replaying
+from feelahead.recordings import replay_robot as replaying
 from feelahead.recordings.comparison import Comparison, recorded_entries
 from feelahead.recordings.playback import Playback, Seen, seen
-from feelahead.recordings.replay import replay_operator, replay_robot
+from feelahead.recordings.replay_operator import replay_operator
+from feelahead.recordings.replay_robot import replay_robot
 from feelahead.recordings.tables import read_tables
 from robot_side.compiled.warm_up import kernel_digests
 from robot_side.parts import build_parts

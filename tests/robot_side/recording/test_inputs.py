@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 
 from common.roles import Role
 from robot_side.arm.port import ArmState
-from robot_side.recording.inputs import ARRAYS, FramePacker, FrameUnpacker, pack_state, unpack_state
+from robot_side.recording.arm_states import pack_state, unpack_state
+from robot_side.recording.frames import ARRAYS, FramePacker, FrameUnpacker
 from robot_side.surroundings.perceived import PerceivedObjects
 
 ANY_FLOAT = st.floats(width=64)

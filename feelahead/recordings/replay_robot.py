@@ -1,11 +1,8 @@
-"""Run both cores again with their recorded inputs, and compare their outputs with the recorded ones."""
+"""Run the robot side's core again with its recorded inputs, and compare its output with the recorded one."""
 
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
-from typing import Final
-
-import msgspec
 
 from common.arrays import FloatArray
 from common.errors import ConfigurationError
@@ -14,17 +11,12 @@ from common.recording.provenance import processor_name, settings_from
 from common.recording.reading import Recording
 from common.roles import Role
 from feelahead.recordings.comparison import Comparison, differing_origin, recorded_entries, require_side
-from feelahead.recordings.controller import read_value
-from operator_side.assembly import build_operator_side
-from operator_side.controller.state import ControllerState
-from operator_side.core import OperatorSide
-from operator_side.hands.travel_calibration import TravelCalibration
-from operator_side.settings import OperatorSettings
 from robot_side.arm.port import Arm, ArmState
 from robot_side.compiled.warm_up import import_kernels, kernel_digests, warm_up
 from robot_side.core import RobotSide
 from robot_side.parts import build_parts
-from robot_side.recording.inputs import FrameUnpacker, unpack_state
+from robot_side.recording.arm_states import unpack_state
+from robot_side.recording.frames import FrameUnpacker
 from robot_side.settings import RobotSettings
 from robot_side.surroundings.perceived import PerceivedObjects
 
@@ -110,52 +102,3 @@ def replay_robot(recording: Recording) -> Comparison:
 def _by_last_names(digests: Mapping[str, str]) -> dict[str, str]:
     """Return the digests by file and function, so that a kernel that moved to another package counts as the same."""
     return {".".join(name.split(".")[-2:]): digest for name, digest in digests.items()}
-
-
-_INPUTS: Final[Mapping[int, Callable[[OperatorSide, bytes, float], object]]] = {
-    Kind.RECEIVED: lambda core, content, now_s: core.receive(split_text(content)[1], now_s),
-    Kind.SEEN: OperatorSide.receive_view,
-    Kind.CALIBRATED: lambda core, content, _: core.calibrate(msgspec.json.decode(content, type=TravelCalibration)),
-    Kind.FOUND: lambda core, _, now_s: core.controller_found(now_s),
-    Kind.LOST: lambda core, _, now_s: core.controller_lost(now_s),
-    Kind.WATCHED: lambda core, _, now_s: core.link.stamp(now_s),
-    Kind.STOPPED: lambda core, _, now_s: core.press_stop(now_s),
-    Kind.MARKED: lambda core, content, now_s: core.marker.mark(msgspec.json.decode(content), now_s),
-    Kind.TUNED: lambda core, content, now_s: core.tune(**msgspec.json.decode(content), now_s=now_s),
-}
-"""For each kind of entry, the call that gives the recorded input to the operator side's core."""
-
-
-def replay_operator(recording: Recording) -> Comparison:
-    """Compute the motion commands and the effects for the controller again, and compare them with the recorded ones.
-
-    Raises ConfigurationError if the side was not recorded.
-    """
-    header = require_side(recording, "operator")
-    settings = settings_from(header["settings"], OperatorSettings)
-    core = build_operator_side(settings, header["epoch"], header["clock_domain"])
-    compared = Comparison("operator", "commands and reports to the controller")
-    sent: deque[bytes] = deque()
-    feels: deque[bytes] = deque()
-    for entry in recorded_entries(recording, "operator", compared.notes):
-        now_s, content = entry.now_s, entry.content
-        if (give := _INPUTS.get(entry.kind)) is not None:
-            give(core, content, now_s)
-        match entry.kind:
-            case Kind.HANDS:
-                core.read_state(read_value(content, ControllerState), now_s)
-            case Kind.TOLD:
-                compared.take(content, feels.popleft() if feels else None, feel=True)
-            case Kind.MOTION:
-                compared.missed(sent)
-                sent.extend(message.payload for message in core.motion(now_s))
-            case Kind.OUTPUT:
-                compared.missed(feels, feel=True)
-                if (feel := core.feel_now(now_s)) is not None:
-                    feels.append(msgspec.msgpack.encode(feel))
-            case Kind.SENT:
-                payload = split_text(split_text(content)[1])[1]
-                compared.take(payload, sent.popleft() if sent else None)
-    compared.missed(sent)
-    compared.missed(feels, feel=True)
-    return compared

@@ -1,7 +1,5 @@
-"""Encoding and decoding of the core's inputs other than payloads: arm states and frames of perceived objects.
+"""Encoding and decoding of recorded frames of perceived objects.
 
-    state   time f64, n u16, positions n f64, velocities n f64, f u16, fingers f f64, opening f64, holding u8,
-            loads n f64 or nothing
     frame   time f64, whole u8, then for each array of ARRAYS: tag u8, rows u32, and by the tag
               0   nothing: same as in the frame before   1   rows x width values
               2   count u32, count row numbers u32, count x width values: these rows, the others as before
@@ -20,7 +18,6 @@ import msgspec
 import numpy as np
 
 from common.roles import Role
-from robot_side.arm.port import ArmState
 from robot_side.surroundings.perceived import KINDS, PerceivedObjects
 
 ARRAYS: Final[Mapping[str, tuple[type, tuple[int, ...]]]] = {
@@ -36,43 +33,6 @@ _SAME, _WHOLE, _ROWS, _NONE = range(4)
 _FRAME: Final = struct.Struct("<dB")
 _ARRAY: Final = struct.Struct("<BI")
 _ROLES: Final = tuple(Role)
-
-
-def pack_state(state: ArmState) -> bytes:
-    """Encode a state."""
-    joints, fingers = state.joint_positions_rad, state.finger_positions
-    return b"".join(
-        (
-            struct.pack("<dH", state.time_s, len(joints)),
-            joints.tobytes(),
-            state.joint_velocities_rad_s.tobytes(),
-            struct.pack("<H", len(fingers)),
-            fingers.tobytes(),
-            struct.pack("<dB", state.gripper_opening_m, state.gripper_holding),
-            b"" if state.joint_loads_nm is None else state.joint_loads_nm.tobytes(),
-        )
-    )
-
-
-def unpack_state(content: bytes) -> ArmState:
-    """Decode a state; ValueError or struct.error for invalid content."""
-    time_s, joints = struct.unpack_from("<dH", content)
-    position = 10
-
-    def values(count: int) -> Any:
-        nonlocal position
-        read = np.frombuffer(content, "<f8", count, position).copy()
-        position += 8 * count
-        return read
-
-    positions, velocities = values(joints), values(joints)
-    (fingers,) = struct.unpack_from("<H", content, position)
-    position += 2
-    finger_positions = values(fingers)
-    opening_m, holding = struct.unpack_from("<dB", content, position)
-    position += 9
-    loads = values(joints) if len(content) > position else None
-    return ArmState(time_s, positions, velocities, finger_positions, opening_m, bool(holding), loads)
 
 
 class FramePacker:
