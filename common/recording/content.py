@@ -12,7 +12,8 @@ from common.recording.decoding import Decoder, Shown, shown_view, view_message
 from common.recording.drawing import Drawing
 from common.recording.entries import unpack_block
 from common.recording.mcap_file import RecordingFile
-from common.recording.wire import BLOCK, FACTS, FORMAT, HEADER, NOTE, STATUS, VIEW, as_json, unstamped
+from common.recording.topics import FACTS_TOPIC
+from common.recording.wire import BLOCK, FACTS, FORMAT, HEADER, NOTE, SCHEMA, STATUS, VIEW, as_json, unstamped
 
 _OTHER: Final = {"robot": "operator", "operator": "robot"}
 
@@ -39,13 +40,16 @@ class Content:
         if kind == BLOCK:
             self._block(side, content)
             return
+        if kind == SCHEMA:
+            self._file.schemas[FACTS_TOPIC] = json.loads(content)
+            return
         now_s, content = unstamped(content)
         if kind == VIEW:
             self._view(side, now_s, content)
         elif kind == STATUS:
             self._status(side, now_s, json.loads(content))
         elif kind == FACTS:
-            self._file.write("/operator/facts", now_s, content)
+            self._file.write(FACTS_TOPIC, now_s, content)
         elif kind == NOTE:
             self._drawing.log(side, now_s, content.decode(errors="replace"))
         else:

@@ -13,6 +13,7 @@ from common.protocol.codec import decode, decode_view
 from common.protocol.messages import MotionCommand, StiffnessUpdate, Telemetry
 from common.protocol.view_messages import AnyViewMessage, SceneState
 from common.recording.entries import Block, Entry, Kind, split_text
+from common.recording.topics import by_name
 from common.recording.wire import as_json
 
 AGES_PERIOD_S: Final = 0.01
@@ -84,12 +85,9 @@ class Decoder:
             if not sent and header.sequence > self._field_number:
                 self._field_number, self._field_sent_s = header.sequence, header.sent_s
             if sent or self.alone:
-                values = msgspec.structs.asdict(message) | {
-                    name: msgspec.structs.asdict(getattr(message, name)) for name in ("l2", "r2")
-                }
-                yield _shown("/stiffness", entry.now_s, stamps, values)
+                yield _shown("/stiffness", entry.now_s, stamps, by_name(message))
         elif isinstance(message, MotionCommand) and (sent or self.alone):
-            yield _shown("/command", entry.now_s, stamps, msgspec.structs.asdict(message))
+            yield _shown("/command", entry.now_s, stamps, by_name(message))
 
     def _since_ms(self, now_s: float, sent_s: float) -> float:
         """Return the time from the other side's stamp `sent_s` to `now_s`, in milliseconds."""
@@ -120,14 +118,9 @@ def shown_view(message: AnyViewMessage | Telemetry, now_s: float, objects: tuple
     """
     stamps = {"time_s": now_s, "sequence": message.header.sequence, "sent_s": message.header.sent_s}
     if isinstance(message, Telemetry):
-        yield _shown("/telemetry", now_s, stamps, msgspec.structs.asdict(message))
+        yield _shown("/telemetry", now_s, stamps, by_name(message))
     elif isinstance(message, SceneState):
-        yield _shown(
-            "/enlargement",
-            now_s,
-            stamps,
-            {name: msgspec.structs.asdict(getattr(message, name)) for name in ("l2", "r2")},
-        )
+        yield _shown("/enlargement", now_s, stamps, {"l2": by_name(message.l2), "r2": by_name(message.r2)})
         of_objects = [
             {"object": objects[index] if index < len(objects) else str(index), "l2_mm3": 1e9 * l2, "r2_mm3": 1e9 * r2}
             for index, l2, r2 in message.overlaps
@@ -136,5 +129,4 @@ def shown_view(message: AnyViewMessage | Telemetry, now_s: float, objects: tuple
 
 
 def _shown(topic: str, now_s: float, stamps: dict[str, Any], values: dict[str, Any]) -> Shown:
-    values.pop("header", None)
     return Shown(topic, now_s, as_json(stamps | values))

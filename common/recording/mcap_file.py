@@ -1,6 +1,5 @@
 """MCAP file, written through foxglove-sdk in chunks of about a second, each completed before the next begins."""
 
-import json
 import logging
 import os
 from collections.abc import Callable, Mapping
@@ -11,7 +10,8 @@ import foxglove
 from foxglove import channels
 from foxglove.mcap import MCAPCompression, MCAPWriteOptions
 
-from common.recording.wire import BINARY, ENCODING, PROFILE, schema_of
+from common.recording.topics import TYPES, json_schema
+from common.recording.wire import BINARY, ENCODING, PROFILE
 
 _NANOSECONDS: Final = 1e9
 
@@ -35,6 +35,8 @@ class RecordingFile:
         self._output = _Output(path)
         self._context = foxglove.Context()
         self._channels: dict[str, Any] = {}
+        self.schemas = {topic: json_schema(topic, kind) for topic, kind in TYPES.items()}
+        """JSON schemas by topic; a topic without one is written as JSON of any form"""
         self._writer = foxglove.open_mcap(
             self._output,
             context=self._context,
@@ -55,7 +57,7 @@ class RecordingFile:
 
     def write(self, topic: str, now_s: float, content: bytes) -> None:
         """Write a message in our own encoding: binary for a topic in BINARY, else JSON."""
-        self._log(topic, now_s, content, lambda: self._own_channel(topic, content))
+        self._log(topic, now_s, content, lambda: self._own_channel(topic))
 
     def draw(self, topic: str, now_s: float, content: Any) -> None:
         """Write a message `content` of one of Foxglove's types."""
@@ -102,11 +104,11 @@ class RecordingFile:
         """Return how many seconds and bytes are in complete chunks, and the error, if any."""
         return {"kept_s": self.kept_s, "bytes": self.kept_bytes, "error": self.error}
 
-    def _own_channel(self, topic: str, first: bytes) -> foxglove.Channel:
+    def _own_channel(self, topic: str) -> foxglove.Channel:
         if topic in BINARY:
             schema = foxglove.Schema(name=BINARY[topic], encoding="", data=b"")
             return foxglove.Channel(topic, schema=schema, message_encoding=ENCODING, context=self._context)
-        return foxglove.Channel(topic, schema=schema_of(topic, json.loads(first)), context=self._context)
+        return foxglove.Channel(topic, schema=self.schemas.get(topic), message_encoding="json", context=self._context)
 
     def _attempt(self, write: Any) -> bool:
         try:

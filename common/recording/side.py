@@ -20,7 +20,8 @@ from common.companion.process import Companion
 from common.errors import ConfigurationError
 from common.recording.entries import pack_block
 from common.recording.packages import require_packages
-from common.recording.wire import BLOCK, END, FACTS, HEADER, NOTE, STATUS, VIEW, as_json, stamped
+from common.recording.topics import FACTS_TOPIC, json_schema
+from common.recording.wire import BLOCK, END, FACTS, HEADER, NOTE, SCHEMA, STATUS, VIEW, as_json, stamped
 
 _RECORDER: Final = "common.recording.recorder"
 _BLOCK_S: Final = 0.04
@@ -78,7 +79,7 @@ class SideRecording:
         self._status_s = -1.0
         self._said = dict(_NOTHING)
         self._notes: list[str] = []
-        self._gone = self._closed = False
+        self._gone = self._closed = self._described = False
 
     def begin(self, header: Mapping[str, Any]) -> None:
         """Send the values from which the core was made, which a replay needs; call it before anything else is sent."""
@@ -107,7 +108,11 @@ class SideRecording:
 
     def facts(self, now_s: float, facts: msgspec.Struct) -> None:
         """Record the facts that the operator side shows at `now_s`."""
-        self._channel.send(FACTS, stamped(now_s), msgspec.json.encode(facts))
+        # A full channel takes nothing; facts without their schema would have none in the whole file.
+        if not self._described:
+            self._described = self._channel.send(SCHEMA, as_json(json_schema(FACTS_TOPIC, type(facts))))
+        if self._described:
+            self._channel.send(FACTS, stamped(now_s), msgspec.json.encode(facts))
 
     def note(self, text: str) -> None:
         """Record a line that is now shown to people."""

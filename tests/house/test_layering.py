@@ -25,7 +25,7 @@ ARROWS = """
     common/protocol: common common/rate common/timing
     common/realtime: common
     common/companion:
-    common/recording: common common/companion common/protocol
+    common/recording: common common/companion common/protocol common/status
     common/video: common/protocol
     common/sockets: common common/files
     common/status: common/protocol

@@ -18,7 +18,7 @@ from common.recording.content import Content
 from common.recording.entries import Entry, Kind, entry, pack_block, split_text, text, unpack_block
 from common.recording.mcap_file import RecordingFile
 from common.recording.reading import open_recording
-from common.recording.wire import BLOCK, FORMAT, HEADER, NOTE, STATUS, VIEW, as_json, schema_of, stamped
+from common.recording.wire import BLOCK, FORMAT, HEADER, NOTE, STATUS, VIEW, as_json, stamped
 from tests.helpers.felt import scene_state
 from tests.helpers.refusal import refusal
 
@@ -175,22 +175,6 @@ def test_text_before_bytes(short: bytes, rest: bytes) -> None:
     assert split_text(text(short) + rest) == (short, rest)
     with pytest.raises(ValueError, match="is cut off"):
         split_text((text(short) + rest)[: len(short)] if short else b"")
-
-
-def test_a_topics_schema_has_the_types_of_its_first_message_and_of_what_was_empty_in_it() -> None:
-    known = schema_of("/robot/status", {"time_s": 1, "armed": True, "ways": [0.5], "delay_ms": None, "target": None})
-    assert known["title"] == "feelahead.RobotStatus"
-    number, text = {"type": "number"}, {"type": "string"}
-    told = {name: known["properties"][name] for name in ("time_s", "armed", "ways", "delay_ms", "target")}
-    assert told == {
-        "time_s": number,
-        "armed": {"type": "boolean"},
-        "ways": {"type": "array", "items": number},
-        "delay_ms": {"type": ["number", "null"]},
-        "target": text,
-    }
-    objects = schema_of("/overlap", {"objects": []})["properties"]["objects"]["items"]["properties"]
-    assert objects == {"object": text, "l2_mm3": number, "r2_mm3": number}
 
 
 @pytest.mark.parametrize("room", [500_001, 511_117, 532_003, 563_333, 594_567, 600_001])

@@ -11,11 +11,13 @@ from common.recording import packages
 from common.recording.content import Content
 from common.recording.mcap_file import RecordingFile
 from common.recording.reading import open_recording
+from common.recording.topics import FACTS_TOPIC, TYPES
 from common.recording.wire import HEADER, as_json
 from feelahead.commands.demo.command import demo
 from feelahead.commands.recordings import export, plot, replay
 from feelahead.recordings.replay_operator import replay_operator
 from feelahead.recordings.replay_robot import replay_robot
+from tests.helpers.recordings.schemas import fitting_topics
 from tests.helpers.refusal import refusal
 
 COMMANDS = (replay, export, plot)
@@ -75,6 +77,7 @@ def test_a_real_run_is_computed_anew_to_the_same_bits(tmp_path: Path) -> None:
     recording = open_recording(path)
     assert recording.whole
     assert set(recording.headers) == {"robot", "operator"}
+    assert fitting_topics(path) == {*TYPES, FACTS_TOPIC} - {"/episode"}
     robot, operator = replay_robot(recording), replay_operator(recording)
     assert robot.made == robot.equal == told["messages"]["stiffness_sent"] > 0
     assert operator.made == operator.equal > 0

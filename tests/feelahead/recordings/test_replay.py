@@ -32,6 +32,7 @@ from feelahead.recordings.tables import read_tables
 from robot_side.compiled.warm_up import kernel_digests
 from robot_side.parts import build_parts
 from tests.feelahead.recordings.conftest import DURATION_S, record_loopback
+from tests.helpers.recordings.schemas import fitting_topics
 
 pytestmark = [pytest.mark.long, pytest.mark.xdist_group("recorded run")]
 
@@ -74,6 +75,8 @@ def test_a_run_with_episodes_and_the_scene_put_back_is_made_again(tmp_path: Path
     assert {one["side"] for one in shown} == {"operator"}
     heard = [one for one in recorded_entries(recording, "robot", []) if one.kind == Kind.EPISODE]
     assert [msgspec.json.decode(one.content) for one in heard] == [one["mark"] for one in shown]
+    statuses = {"/robot/status", "/operator/status"}
+    assert fitting_topics(path) == {"/stiffness", "/command", "/ages", "/episode"} | statuses
     arm = read_tables(recording).table("arm")
     positions = np.stack([arm.numbers(f"position_rad.{joint}") for joint in range(6)], axis=1)
     away = np.abs(positions - positions[0]).max(axis=1)

@@ -1,0 +1,160 @@
+"""Types of the JSON messages in a recording, by topic, and the JSON schemas that follow from declared types.
+
+Messages that are arrays on the wire are recorded with the names of their fields.
+"""
+
+from collections.abc import Mapping
+from functools import cache
+from types import UnionType
+from typing import Any, Final, Literal, Union, get_args
+
+import msgspec
+
+from common.episode import EpisodeMark
+from common.protocol.messages import MotionCommand, StiffnessUpdate, Telemetry
+from common.protocol.view_messages import EnlargementTerms
+from common.status.statuses import OperatorStatus, RobotStatus
+
+FACTS_TOPIC: Final = "/operator/facts"
+"""Topic whose type belongs to the operator side, which sends its schema"""
+Side = Literal["robot", "operator"]
+
+
+class Moment(msgspec.Struct, frozen=True):
+    """Time of a message."""
+
+    time_s: float
+    """Time on the recording side's monotonic clock"""
+
+
+class Stamps(Moment, frozen=True):
+    """Stamps of a control message."""
+
+    side: Side
+    """Side that recorded the message"""
+    sequence: int
+    sent_s: float
+    age_ms: float | None
+    loop_age_ms: float | None
+
+
+class ViewStamps(Moment, frozen=True):
+    """Stamps of a view message."""
+
+    sequence: int
+    sent_s: float
+
+
+class Ages(Moment, frozen=True):
+    """Ages of what a side uses; None while unknown."""
+
+    side: Side
+    command_ms: float | None
+    field_ms: float | None
+    frame_ms: float | None
+
+
+class Episode(Moment, frozen=True):
+    """Mark of an episode."""
+
+    side: Side
+    mark: EpisodeMark
+
+
+class Terms(msgspec.Struct, frozen=True):
+    """Terms of the enlargement along each trigger."""
+
+    l2: EnlargementTerms
+    r2: EnlargementTerms
+
+
+class ObjectOverlap(msgspec.Struct, frozen=True):
+    """Overlap of an object along each trigger."""
+
+    object: str
+    l2_mm3: float
+    r2_mm3: float
+
+
+class Overlaps(ViewStamps, frozen=True):
+    """Overlaps of the objects."""
+
+    objects: list[ObjectOverlap]
+
+
+def by_name(value: Any) -> Any:
+    """Return a struct as a dict without its header, nested ones as dicts, too; any other value as it is."""
+    if not isinstance(value, msgspec.Struct):
+        return value
+    fields = msgspec.structs.asdict(value)
+    return {name: by_name(one) for name, one in fields.items() if name != "header"}
+
+
+@cache
+def _named(kind: type[msgspec.Struct], before: type[msgspec.Struct] | None = None) -> type[msgspec.Struct]:
+    """Return the type of what `by_name` makes of a `kind`, with the fields of `before` in front."""
+    fields = [
+        (one.name, _named_hint(one.type), msgspec.field(name=one.encode_name, **_default(one)))
+        for part in (before, kind)
+        if part is not None
+        for one in msgspec.structs.fields(part)
+        if one.name != "header"
+    ]
+    return msgspec.defstruct(kind.__name__, fields, namespace={"__doc__": kind.__doc__}, kw_only=True)
+
+
+def _named_hint(hint: Any) -> Any:
+    if isinstance(hint, UnionType):
+        return Union[tuple(_named_hint(one) for one in get_args(hint))]  # noqa: UP007  # of a computed tuple
+    return _named(hint) if isinstance(hint, type) and issubclass(hint, msgspec.Struct) else hint
+
+
+def _default(one: msgspec.structs.FieldInfo) -> dict[str, Any]:
+    return {} if one.default is msgspec.NODEFAULT else {"default": one.default}
+
+
+TYPES: Final[Mapping[str, type[msgspec.Struct]]] = {
+    "/stiffness": _named(StiffnessUpdate, Stamps),
+    "/command": _named(MotionCommand, Stamps),
+    "/ages": Ages,
+    "/episode": Episode,
+    "/telemetry": _named(Telemetry, ViewStamps),
+    "/enlargement": _named(Terms, ViewStamps),
+    "/overlap": Overlaps,
+    "/robot/status": _named(RobotStatus, Moment),
+    "/operator/status": _named(OperatorStatus, Moment),
+}
+"""Type of the messages of each JSON topic but FACTS_TOPIC"""
+
+
+def json_schema(topic: str, kind: type[msgspec.Struct]) -> dict[str, Any]:
+    """Return the JSON schema of `kind`, in the form that most tools read.
+
+    Definitions stand where they are used, each schema has a `type`, a value that may be null has two, and a tuple of
+    equal items has `items`. So do the schemas that Foxglove's SDK derives from types.
+    """
+    (schema,), components = msgspec.json.schema_components((kind,), ref_template="{name}")
+    return _plain(schema, components) | {"title": f"feelahead.{topic.title().replace('/', '')}"}
+
+
+def _plain(schema: dict[str, Any], components: Mapping[str, Any]) -> dict[str, Any]:
+    schema = components[schema["$ref"]] | schema if "$ref" in schema else schema
+    plain = {name: value for name, value in schema.items() if name not in ("$ref", "anyOf", "default")}
+    if "anyOf" in schema:
+        one, null = (_plain(one, components) for one in schema["anyOf"])  # None is the only alternative that we declare
+        plain |= one | {"type": [one["type"], null["type"]]}
+        if "enum" in one:
+            plain["enum"] = [*one["enum"], None]
+    if "enum" in schema:
+        plain["type"] = "string"
+    if "properties" in schema:
+        plain["properties"] = {name: _plain(one, components) for name, one in schema["properties"].items()}
+    items = [_plain(one, components) for one in schema.get("prefixItems", ())]
+    if items and all(one == items[0] for one in items):
+        del plain["prefixItems"]
+        plain["items"] = items[0]
+    elif items:
+        plain["prefixItems"] = items
+    elif "items" in schema:
+        plain["items"] = _plain(schema["items"], components)
+    return plain
