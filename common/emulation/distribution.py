@@ -5,6 +5,7 @@ from the mean. Our tables are computed from the distributions' definitions.
 """
 
 import functools
+from statistics import NormalDist
 from typing import Literal
 
 import numpy as np
@@ -45,9 +46,9 @@ def _normal_steps(lowest: float = _LOWEST_ENTRY) -> FloatArray:
     Entry k is the quantile at the probability (4 k + 1/2) / 16384.
     """
     probabilities = (4.0 * np.arange(TABLE_SIZE) + 0.5) / (4.0 * TABLE_SIZE)
-    from scipy.special import ndtri  # noqa: PLC0415  # slow to load, and most runs emulate no such delay
-
-    steps: FloatArray = np.maximum(np.rint(STEPS_PER_JITTER * ndtri(probabilities)), lowest)
+    # SciPy's function would be loaded in a turn, for tenths of a second, when a page changes the link.
+    values = np.array([*map(NormalDist().inv_cdf, probabilities.tolist())])
+    steps: FloatArray = np.maximum(np.rint(STEPS_PER_JITTER * values), lowest)
     return steps
 
 
