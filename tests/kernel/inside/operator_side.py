@@ -115,16 +115,22 @@ def test_without_a_controller_it_says_so_and_commands_nothing(desk: Desk) -> Non
     assert robot.state == "disarmed"
 
 
-def test_unplugged_in_mid_run_the_robot_stops_and_stays_disarmed(desk: Desk) -> None:
+@pytest.mark.parametrize(("dongle", "said"), [(False, "the controller is gone"), (True, "no new report for")])
+def test_gone_in_mid_run_the_robot_stops_and_stays_disarmed(desk: Desk, dongle: bool, said: str) -> None:
+    """The controller is unplugged; or it is switched off, and its dongle repeats its last report."""
     plugged, robot = desk.plugged, desk.robot
     arm_and_pull(desk)
-    plugged.unplug()
+    desk.notes.clear()
+    plugged.offered.off = dongle
+    if not dongle:
+        plugged.unplug()
     wait_until("the robot stops", lambda: robot.state == "disarmed" and not robot.moving)
     wait_until("the operator side notices", desk.controller_lost, instead=lambda: desk.notes)
-    desk.note("the controller is gone")
+    desk.note(said)
     commands = robot.commands
     stays("commands are sent without a controller", lambda: robot.commands == commands)
     # The hands still pull R2 and hold L1.
+    plugged.offered.off = False
     plugged.plug_in()
     wait_until("commands come again", lambda: robot.commands > commands + 10, _PATIENCE_S)
     desk.note("back again")

@@ -33,6 +33,21 @@ class Variant:
         return f"{self.model.title} on {self.transport.value}"
 
 
+class Dongle(UhidController):
+    """Virtual controller that repeats its last report while it is `off`, as a dongle does."""
+
+    off = False
+    _last: bytes | None = None
+
+    def next_input(self, now_s: float) -> bytes | None:
+        """Return the next input report's event; the last one again while the controller is off."""
+        if self.off:
+            return self._last if self.driven else None
+        event = super().next_input(now_s)
+        self._last = event or self._last
+        return event
+
+
 class Plugged:
     """Simulated controller, offered to the kernel through /dev/uhid by a thread while it is plugged in.
 
@@ -43,7 +58,7 @@ class Plugged:
         self.variant = variant
         self.identity = UhidIdentity(variant.transport, variant.model, ADDRESS)
         self._simulated = SimulatedDualSense(variant.transport, variant.model, address=ADDRESS)
-        self.offered = UhidController(self._simulated, self.identity)
+        self.offered = Dongle(self._simulated, self.identity)
         self._asked: deque[Callable[[], None]] = deque()
         self._ending = False
         self._failure: BaseException | None = None
