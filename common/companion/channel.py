@@ -60,6 +60,9 @@ class Channel:
             except (BlockingIOError, InterruptedError):
                 return
             except OSError:
+                # The other end is closed. What it had sent before still counts.
+                while self._read():
+                    pass
                 self._end()
                 return
             self.waiting -= sent
@@ -76,16 +79,7 @@ class Channel:
         Reads the system's buffer once, so that a fast sender cannot block the caller.
         """
         self.flush()
-        try:
-            arrived = self._part.recv(_AT_ONCE)
-        except (BlockingIOError, InterruptedError):
-            return []
-        except OSError:
-            arrived = b""
-        if not arrived:
-            self._end()
-            return []
-        self._begun += arrived
+        self._read()
         whole, start = [], 0
         while len(self._begun) - start >= _LENGTH.size:
             (length,) = _LENGTH.unpack_from(self._begun, start)
@@ -99,6 +93,19 @@ class Channel:
             start = end
         del self._begun[:start]
         return whole
+
+    def _read(self) -> bool:
+        """Read the system's buffer once; return whether anything was there."""
+        try:
+            arrived = self._part.recv(_AT_ONCE)
+        except (BlockingIOError, InterruptedError):
+            return False
+        except OSError:
+            arrived = b""
+        if not arrived:
+            self._end()
+        self._begun += arrived
+        return bool(arrived)
 
     def _end(self) -> None:
         self.ended = True

@@ -152,8 +152,10 @@ class SideRecording:
         self.idle(math.inf)
         _wait_until_sent(self._channel, _LEAVE_LIMIT_S)
         self._channel.send(END)
+        # A recorder of our own is waited for in any case; its last answer has the whole file's figures.
+        limit_s = _LEAVE_LIMIT_S if self._recorder is None else _FINISH_LIMIT_S
         while "ended" not in self._said and not self._channel.ended:
-            if not select.select([self._channel], [], [], _LEAVE_LIMIT_S)[0]:
+            if not select.select([self._channel], [], [], limit_s)[0]:
                 break
             self._listen()
         if self._recorder is None:
