@@ -1,17 +1,21 @@
-"""Reading of recordings, even if the file was cut off: up to the last complete chunk (a second).
+"""Reading of recordings in any legal form of MCAP, even if the file was cut off: up to the last complete chunk.
 
-The file is read record by record, because its index is at the end, which a file that was cut off lacks.
+A recording that another tool wrote again, in another form or order, gives the same messages in the same order.
 """
 
 import json
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
+from heapq import heappop, heappush
+from itertools import count
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 from common.errors import ConfigurationError
+from common.recording.mcap_scan import Part, Scan, messages_in
 from common.recording.packages import require_packages
-from common.recording.wire import FORMAT, PROFILE
+from common.recording.topics import FACTS_TOPIC, TYPES
+from common.recording.wire import BINARY, FORMAT, PROFILE
 
 _SIDES: Final = {f"{PROFILE}.{side}": side for side in ("robot", "operator")}
 
@@ -34,58 +38,92 @@ class Recording:
     """Settings, versions and other values of each recorded core, keyed by side"""
     whole: bool
     """Whether the file was finished; if not, it is read up to the last complete chunk"""
-    damaged: bool = False
+    damaged: bool
     """Whether a chunk is damaged; the file is then read up to that chunk"""
-    end_ns: int = 0
-    """Newest stamp in the intact chunks, in nanoseconds on the wall clock"""
-
-    def began_ns(self) -> int:
-        """Return the stamp of the first message, in nanoseconds on the wall clock; 0 without messages."""
-        return next((message.log_ns for message in self.messages()), 0)
+    topics: Collection[str]
+    """Topics with messages"""
+    began_ns: int
+    """Oldest stamp, in nanoseconds on the wall clock"""
+    end_ns: int
+    """Newest stamp"""
+    _parts: tuple[Part, ...]
+    """Parts of the file by their oldest stamps"""
+    _names: Mapping[int, str]
 
     def length_s(self) -> float:
         """Return the time from the first message to the last one that can be read, in seconds."""
-        return 1e-9 * (self.end_ns - self.began_ns()) if self.end_ns else 0.0
+        return 1e-9 * (self.end_ns - self.began_ns)
+
+    def require(self, topics: Collection[str]) -> None:
+        """Raise ConfigurationError if there are no messages of any of `topics`."""
+        if not any(topic in self.topics for topic in topics):
+            here, valid = (", ".join(sorted(names)) for names in (self.topics, topics))
+            raise ConfigurationError(f"{self.path}: has only messages of {here}; valid: with one at least of {valid}")
 
     def messages(self, topics: Collection[str] = ()) -> Iterator[Message]:
-        """Yield the messages of `topics`, or all if none is given, in the order of the file, nearly that of time."""
-        from mcap.records import Channel  # noqa: PLC0415
-        from mcap.records import Message as Logged  # noqa: PLC0415
+        """Yield the messages of `topics`, or all if none is given, in order of time.
 
-        names: dict[int, str] = {}
-        for record, inside in _records(self.path):
-            if record is None:
-                return
-            for one in inside:
-                if isinstance(one, Channel):
-                    names[one.id] = one.topic
-                elif isinstance(one, Logged):
-                    topic = names.get(one.channel_id, "")
+        At equal times they come in the order of their topics' names, and within a topic as they were written.
+        """
+        waiting: list[tuple[int, str, int, int, bytes]] = []
+        number = count()
+        with self.path.open("rb") as file:
+            for part in self._parts:
+                while waiting and waiting[0][0] < part.start_ns:
+                    yield _first(waiting)
+                for one in messages_in(file, part):
+                    topic = self._names[one.channel_id]
                     if not topics or topic in topics:
-                        yield Message(topic, one.log_time, one.data)
+                        heappush(waiting, (one.log_time, topic, one.sequence, next(number), one.data))
+        while waiting:
+            yield _first(waiting)
+
+
+def _first(waiting: list[tuple[int, str, int, int, bytes]]) -> Message:
+    log_ns, topic, _, _, content = heappop(waiting)
+    return Message(topic, log_ns, content)
 
 
 def open_recording(path: Path) -> Recording:
     """Scan the file at `path`; raises ConfigurationError, in one line, if it is no recording of ours."""
     require_packages("a recording", "mcap")
-    from mcap.records import Chunk, DataEnd, Metadata  # noqa: PLC0415
-
-    headers: dict[str, Mapping[str, Any]] = {}
-    whole, damaged, end_ns = False, False, 0
-    for record, _ in _records(path):
-        damaged |= record is None
-        if isinstance(record, Metadata) and record.name in _SIDES:
-            headers[_SIDES[record.name]] = _header(path, record.metadata)
-        elif isinstance(record, Chunk):
-            end_ns = max(end_ns, record.message_end_time)
-        whole |= isinstance(record, DataEnd)
-    if not headers and damaged:
-        raise ConfigurationError(f"{path}: its header is damaged; valid: an undamaged file that --record made")
-    if not headers:
+    scan = Scan(path)
+    try:
+        if path.is_fifo():
+            raise ConfigurationError(f"{path}: cannot be read: it is a pipe; valid: a file that --record made")
+        with path.open("rb") as file:
+            scan.read(file)
+    except OSError as error:
         raise ConfigurationError(
-            f"{path}: holds nothing that feelahead recorded; valid: a file that --record made in a second or longer"
-        )
-    return Recording(path, headers, whole, damaged, end_ns)
+            f"{path}: cannot be read: {error.strerror}; valid: a file that --record made"
+        ) from error
+    headers = _headers(scan)
+    if not scan.parts:
+        why = "holds no messages" if scan.whole else "ends before its first complete second"
+        why = "is damaged in its first second" if scan.damaged else why
+        raise ConfigurationError(f"{path}: {why}; valid: a file that --record made in a second or longer")
+    parts = tuple(sorted(scan.parts))
+    return Recording(
+        path, headers, scan.whole, scan.damaged, scan.topics, parts[0].start_ns, scan.end_ns, parts, scan.names
+    )
+
+
+def _headers(scan: Scan) -> dict[str, Mapping[str, Any]]:
+    found: dict[str, Mapping[str, Any]] = {}
+    for name, values in scan.metadata:
+        if name in _SIDES:
+            header = _header(scan.path, values)
+            if found.setdefault(_SIDES[name], header) != header:
+                raise ConfigurationError(f"{scan.path}: holds two runs of the {_SIDES[name]} side; valid: one")
+    if found:
+        return found
+    why, valid = "holds nothing that feelahead recorded", "a file that --record made in a second or longer"
+    if scan.damaged:
+        why, valid = "its header is damaged", "an undamaged file that --record made"
+    elif not scan.topics.isdisjoint({*TYPES, *BINARY, FACTS_TOPIC}):
+        why = f"lacks the metadata {' and '.join(_SIDES)}, which another tool has left out"
+        valid = "with one at least (mcap filter --include-metadata)"
+    raise ConfigurationError(f"{scan.path}: {why}; valid: {valid}")
 
 
 def _header(path: Path, values: Mapping[str, str]) -> dict[str, Any]:
@@ -101,32 +139,3 @@ def _value(text: str) -> Any:
         return json.loads(text)
     except json.JSONDecodeError:
         return text
-
-
-def _records(path: Path) -> Iterator[tuple[Any, list[Any]]]:
-    """Yield each complete record, with its records if it is a chunk. At a damaged one, yield None and end."""
-    from mcap.exceptions import EndOfFile, InvalidMagic, RecordLengthLimitExceeded  # noqa: PLC0415
-    from mcap.records import Chunk, DataEnd  # noqa: PLC0415
-    from mcap.stream_reader import StreamReader, breakup_chunk  # noqa: PLC0415
-
-    try:
-        if path.is_fifo():
-            raise ConfigurationError(f"{path}: cannot be read: it is a pipe; valid: a file that --record made")
-        with path.open("rb") as file:
-            for record in StreamReader(file, emit_chunks=True, record_size_limit=path.stat().st_size).records:
-                yield record, breakup_chunk(record, validate_crc=True) if isinstance(record, Chunk) else []
-                if isinstance(record, DataEnd):
-                    return  # the rest repeats
-    except OSError as error:
-        raise ConfigurationError(
-            f"{path}: cannot be read: {error.strerror}; valid: a file that --record made"
-        ) from error
-    except InvalidMagic as error:
-        raise ConfigurationError(f"{path}: is no MCAP file; valid: a file that --record made") from error
-    except (EndOfFile, RecordLengthLimitExceeded):
-        return  # cut off while being written
-    except ConfigurationError:
-        raise
-    # Readers and decompressors report flipped bits by various classes.
-    except Exception:
-        yield None, []

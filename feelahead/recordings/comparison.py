@@ -127,6 +127,7 @@ def require_side(recording: Recording, side: str) -> Mapping[str, Any]:
         raise ConfigurationError(
             f"{recording.path}: the {side} side was not recorded; valid: {', '.join(recording.headers)}"
         )
+    recording.require([f"/{side}/inputs"])
     header = dict(recording.headers[side])
     if missing := [name for name in _NEEDED if name not in header]:
         raise ConfigurationError(

@@ -142,9 +142,10 @@ def _cut(marks: Table, times_s: list[float], first: int) -> tuple[list[Episode],
 
 def read_pictures(recording: Recording) -> dict[str, list[Picture]]:
     """Return each camera's pictures, in order; no entry for a camera without any."""
-    began_ns = recording.began_ns()
+    began_ns = recording.began_ns
     wall_s = offset_s = math.nan
     found: dict[str, list[Picture]] = {}
+    undated: dict[tuple[str, int], list[int]] = {}
     for message in recording.messages(["/operator/status", "/view", *(f"/camera/{view}" for view in VIEW_NAMES)]):
         logged_s, time_s = 1e-9 * message.log_ns, 1e-9 * (message.log_ns - began_ns)
         if message.topic == "/operator/status":
@@ -153,16 +154,19 @@ def read_pictures(recording: Recording) -> dict[str, list[Picture]]:
             offset_s = math.nan if status.get("offset_s") is None else status["offset_s"]
         elif message.topic == "/view":
             frame = view_message(message.content)
-            # The recorder writes a picture first, then its message without it.
-            if isinstance(frame, VideoFrame) and (pictures := found.get(frame.view)):
+            # The pictures of a moment come first, then their messages without them.
+            if isinstance(frame, VideoFrame) and (rows := undated.get((frame.view, message.log_ns))):
                 age_s = frame.header.sent_s - frame.captured_s
                 if "robot" not in recording.headers and math.isfinite(offset_s):
                     age_s = logged_s - wall_s - (frame.captured_s - offset_s)
-                pictures[-1] = pictures[-1]._replace(captured_s=time_s - max(0.0, age_s))
+                pictures, row = found[frame.view], rows.pop(0)
+                pictures[row] = pictures[row]._replace(captured_s=time_s - max(0.0, age_s))
         else:
             jpeg = read_image(message.content).jpeg
             view = message.topic.removeprefix("/camera/")
-            found.setdefault(view, []).append(Picture(time_s, jpeg, time_s))
+            undated = {moment: rows for moment, rows in undated.items() if moment[1] == message.log_ns}
+            undated.setdefault((view, message.log_ns), []).append(len(found.setdefault(view, [])))
+            found[view].append(Picture(time_s, jpeg, time_s))
     return {view: found[view] for view in VIEW_NAMES if view in found}
 
 

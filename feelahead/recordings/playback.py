@@ -49,7 +49,8 @@ def require_protocol(recording: Recording) -> None:
 
 
 def require_statuses(recording: Recording) -> None:
-    """Raise ConfigurationError if a side's first status was written by a release with other fields."""
+    """Raise ConfigurationError if nothing can be shown, or a side's first status is of a release with other fields."""
+    recording.require(_TOPICS)
     for topic, struct in ((_FACTS, OperatorFacts), (_ROBOT, RobotStatus)):
         for message in recording.messages((topic,)):
             try:
@@ -62,8 +63,8 @@ def require_statuses(recording: Recording) -> None:
 
 def seen(recording: Recording) -> Iterator[Seen]:
     """Yield all items that the console can show, in order; pictures are put back into the payloads of their views."""
-    began_ns = recording.began_ns()
-    pictures: dict[tuple[str, int], bytes] = {}
+    began_ns = recording.began_ns
+    pictures: dict[tuple[str, int], list[bytes]] = {}
     for message in recording.messages(_TOPICS):
         time_s = _NANOSECONDS * (message.log_ns - began_ns)
         if message.topic in (_FACTS, _ROBOT):
@@ -72,19 +73,23 @@ def seen(recording: Recording) -> Iterator[Seen]:
             yield Seen(time_s, VIEW, *_view(message, pictures))
         else:
             image = read_image(message.content)
-            pictures = {(image.view, message.log_ns): image.jpeg, **dict(list(pictures.items())[:8])}
+            pictures = {key: waiting for key, waiting in pictures.items() if key[1] == message.log_ns}
+            pictures.setdefault((image.view, message.log_ns), []).append(image.jpeg)
 
 
-def _view(message: Message, pictures: dict[tuple[str, int], bytes]) -> tuple[str, bytes]:
-    """Return the name of what the view payload shows, and the payload as it was sent."""
+def _view(message: Message, pictures: dict[tuple[str, int], list[bytes]]) -> tuple[str, bytes]:
+    """Return the name of what the view payload shows, and the payload as it was sent.
+
+    pictures: those that precede the payloads of the same view and time; its own is taken from them.
+    """
     try:
         view = decode_view(message.content)
     except RemoteProtocolError:
         return "telemetry", message.content  # also for a payload of another version
     if not isinstance(view, VideoFrame):
         return "state" if isinstance(view, SceneState) else "shapes", message.content
-    jpeg = pictures.get((view.view, message.log_ns), b"")
-    return view.view, encode(msgspec.structs.replace(view, jpeg=jpeg))
+    waiting = pictures.get((view.view, message.log_ns))
+    return view.view, encode(msgspec.structs.replace(view, jpeg=waiting.pop(0) if waiting else b""))
 
 
 SLOWEST: Final = 0.01

@@ -62,7 +62,7 @@ def _title(recording: Recording, tables: Tables) -> str:
     header = next(iter(recording.headers.values()))
     settings = recording.headers.get("robot", header)["settings"]
     links = {found["settings"].get("link") or "none" for found in recording.headers.values()}
-    when = datetime.fromtimestamp(1e-9 * recording.began_ns(), UTC).isoformat(sep=" ", timespec="seconds")
+    when = datetime.fromtimestamp(1e-9 * recording.began_ns, UTC).isoformat(sep=" ", timespec="seconds")
     lines = [
         f"{recording.path.name}: {tables.duration_s:.1f} s, {when}",
         f"emulated link: {'; '.join(sorted(links))}",

@@ -30,6 +30,7 @@ _STAMPS: Final = ("time_s", "now_s", "sent_s", "sequence", "side")
 _TOPICS: Final = (
     *("/stiffness", "/command", "/ages", "/telemetry", "/enlargement", "/overlap"),
     *("/robot/status", "/operator/status", "/operator/facts", "/episode"),
+    *("/robot/inputs", "/operator/inputs"),
 )
 _JOINED: Final = (
     *("stiffness", "command", "felt", "controller", "arm"),
@@ -101,9 +102,10 @@ class Tables:
 def read_tables(recording: Recording) -> Tables:
     """Read all tables of a recording; pictures and scenes are left out."""
     tables: dict[str, Table] = {}
-    first_ns = last_ns = recording.began_ns()
+    first_ns = last_ns = recording.began_ns
     zones: dict[str, tuple[float, ...]] = {"l2": _NO_ZONES, "r2": _NO_ZONES}
-    for message in recording.messages((*_TOPICS, "/robot/inputs", "/operator/inputs")):
+    recording.require(_TOPICS)
+    for message in recording.messages(_TOPICS):
         last_ns = max(last_ns, message.log_ns)
         time_s = _NANOSECONDS * (message.log_ns - first_ns)
         if not message.topic.endswith("/inputs"):

@@ -12,7 +12,7 @@ from common.recording.content import Content
 from common.recording.mcap_file import RecordingFile
 from common.recording.reading import open_recording
 from common.recording.topics import FACTS_TOPIC, TYPES
-from common.recording.wire import HEADER, as_json
+from common.recording.wire import HEADER, NOTE, as_json, stamped
 from feelahead.commands.demo.command import demo
 from feelahead.commands.recordings import export, plot, replay
 from feelahead.recordings.replay_operator import replay_operator
@@ -43,6 +43,19 @@ def test_wrong_content_in_a_right_file_is_one_line(tmp_path: Path) -> None:
     file.close()
     for command in COMMANDS[1:]:
         assert "odd.mcap: " in refusal(command, [str(path), "--out", str(tmp_path / f"{command.__name__}.png")])
+
+
+def test_a_recording_with_nothing_for_a_command_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "notes.mcap"
+    file = RecordingFile(path, 0.0)
+    content = Content(file)
+    content.take(0, HEADER + as_json({"side": "robot", "settings": {}, "epoch": 1, "clock_domain": ""}))
+    content.take(0, NOTE + stamped(1.0) + b"listening")
+    file.close()
+    asked = [(one, [str(path)]) for one in COMMANDS]
+    for command, arguments in (*asked, (replay, [str(path), "--check"])):
+        told = refusal(command, arguments)
+        assert "notes.mcap: has only messages of /log; valid: with one at least of /" in told
 
 
 @pytest.mark.parametrize(

@@ -112,7 +112,7 @@ def record_pictures(
     content.take(0, HEADER + as_json({"side": "robot", **run.headers["robot"]}))
     payloads: list[bytes] = []
     next_s = 0.0
-    began_ns = run.began_ns()
+    began_ns = run.began_ns
     for message in run.messages(("/stiffness", "/command", "/robot/inputs")):
         now_s = 1e-9 * (message.log_ns - began_ns)
         if now_s >= next_s:
