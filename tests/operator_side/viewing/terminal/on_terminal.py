@@ -11,10 +11,10 @@ import termios
 import time
 from collections.abc import Callable, Sequence
 
+from tests.helpers.python_process import LIMIT_S
 from tests.helpers.repository import ROOT
 
 ENTERED, LEFT = b"\x1b[?1049h", b"\x1b[?1049l"
-LIMIT_S = 60.0
 
 
 class OnTerminal:
@@ -45,12 +45,13 @@ class OnTerminal:
             if select.select([self.ours], [], [], 0.1)[0]:
                 self.seen += os.read(self.ours, 1 << 16)
 
-    def end(self, last: bytes) -> int:
-        """Send Ctrl-C and read the output up to `last`; return the command's exit code."""
+    def end(self) -> int:
+        """Send Ctrl-C and read all output; return the command's exit code."""
         self.process.send_signal(signal.SIGINT)
-        self.read_until(lambda seen: last in seen)
-        code: int = self.process.wait(LIMIT_S)
-        return code
+        self.read_until(lambda _: self.process.poll() is not None)
+        while select.select([self.ours], [], [], 0.0)[0]:
+            self.seen += os.read(self.ours, 1 << 16)
+        return int(self.process.returncode)
 
     def is_put_back(self) -> bool:
         """Return whether the terminal is as before: normal screen, cursor and input modes."""

@@ -114,7 +114,7 @@ def test_the_screen_follows_the_terminals_size_and_is_put_back_on_ctrl_c(player:
     player.resize(60, 20)
     # A whole screen is sent at once, from the top left corner on, and does not scroll.
     player.read_until(lambda seen: b"\x1b[H" in seen and seen.split(b"\x1b[H")[-2].count(b"\n") == 19)
-    assert player.end(b"the result") == 0
+    assert player.end() == 0
     assert player.is_put_back()
     assert b"player: the result" in player.seen.partition(LEFT)[2]
 
@@ -129,7 +129,7 @@ def test_a_kill_puts_the_terminal_back(player: OnTerminal, whose: str) -> None:
     player.read_until(lambda _: player.is_put_back())
     if whose == "its own":
         assert player.process.poll() is None
-        assert player.end(b"the result") == 0
+        assert player.end() == 0
 
 
 @pytest.mark.processes
@@ -140,7 +140,7 @@ def test_a_terminal_that_stalls_holds_nobody_up(player: OnTerminal) -> None:
     termios.tcflow(player.theirs, termios.TCOOFF)
     assert [player.process.stderr.readline() for _ in range(2)][1] == "sent\n"
     termios.tcflow(player.theirs, termios.TCOON)
-    assert player.end(b"the result") == 0
+    assert player.end() == 0
     assert player.is_put_back()
 
 
