@@ -291,7 +291,7 @@ class SimulatedOperator:
 
     def _drawing_back(self, look: Glance) -> None:
         back_m = math.dist(look.view.tool_position_m, self._from)
-        if back_m > _BACK_M:
+        if back_m > _BACK_M or self._nearing.see(_BACK_M - back_m, look):
             self._enter(Doing.DONE, look.now_s)
         self._go((0.0, 0.0, -_CARRY_M_S), {Button.SQUARE} if back_m < 0.5 * _BACK_M else set())
 

@@ -1,9 +1,11 @@
 """Point between the fingertips of a brought robot's hand, to which its tool's site is moved."""
 
+import math
 from typing import Any, Final
 
 import mujoco  # type: ignore[import-untyped]
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from common.arrays import FloatArray
 from robot_side.drivers.mujoco.gripper_cover import placed_corners
@@ -14,10 +16,16 @@ from robot_side.drivers.mujoco.robot_model import RobotModel, put_site
 _INSIDE_M: Final = 0.015
 """Distance of the tool from the ends of the fingertips, as in the built-in arm"""
 _AWAY_M: Final = 0.02
-"""Distance up to which a site stays where it is: a person grasps as far past the tool's point"""
+_ASIDE_M: Final = 0.005
+"""Distances up to which a site stays where it is: in all, as a person grasps as far past the tool's point, and across"""
+BESIDE_M: Final = 0.013
+"""Least room between the target and each finger: 3 mm by which the spheres protrude, and 10 mm of the arm's and the
+camera's errors at the usual probability"""
 _NEAR_M: Final = 0.033
-"""Distance of the tool's point from a jaw that stands still while the other one closes: the other one pushes an object
-against it. The built-in target's half width fits, and 13 mm for errors"""
+"""Largest distance of the tool's point from a jaw that stands still while the other one closes: the other one pushes an
+object against it. The built-in target's half width fits, and `BESIDE_M`"""
+_ASKEW_RAD: Final = math.radians(45.0)
+"""Angle from its closed position beyond which a jaw that turns pushes an object rather out of the hand than across"""
 _STILL_M: Final = 1e-3
 INTO_M: Final = 0.04
 LOW_INTO_M: Final = 0.01
@@ -28,9 +36,9 @@ def move_site(model: Any, robot: RobotModel, start: FloatArray, travel: GripperT
     """Move the site between the open fingers, near their tips, if it is far from there; return by how much, in m."""
     data = mujoco.MjData(model)
     data.qpos[:] = start
-    by_m = _between(model, data, robot, travel)
+    by_m, aside_m = _between(model, data, robot, travel)
     away_m = float(np.linalg.norm(by_m))
-    if away_m <= _AWAY_M:
+    if away_m <= _AWAY_M and abs(aside_m) <= _ASIDE_M:
         return 0.0
     turn = data.xmat[model.site_bodyid[robot.site]].reshape(3, 3)
     put_site(model, robot.site, model.site_pos[robot.site] + turn.T @ by_m)
@@ -96,8 +104,8 @@ def rooms_m(
     return room_m(hand, from_m, -closing, most_m, into=into), room_m(hand, from_m, closing, most_m, into=into)
 
 
-def _between(model: Any, data: Any, robot: RobotModel, travel: GripperTravel) -> FloatArray:
-    """Return the way (3,), in the world, from the site to midway between the fingers, inside their ends.
+def _between(model: Any, data: Any, robot: RobotModel, travel: GripperTravel) -> tuple[FloatArray, float]:
+    """Return the way (3,), in the world, from the site to midway between the fingers, inside their ends; its part across.
 
     If only one jaw moves, the way ends near the other one instead.
     The ends are those of the open fingers, or of the closed ones if these reach farther. `data` is left open.
@@ -116,7 +124,28 @@ def _between(model: Any, data: Any, robot: RobotModel, travel: GripperTravel) ->
     middle_m = across_m * closing + (max(ends_m) - _INSIDE_M) * approach
     still = still_side(model, data, robot, travel, closing)
     reach_m = (0.5 * apart_m, INTO_M) if still == 0.0 else (apart_m, LOW_INTO_M)
-    left_m, right_m = rooms_m(model, data, robot, site_m + middle_m, closing, *reach_m)
-    aside_m = 0.5 * (right_m - left_m) if still == 0.0 else right_m - _NEAR_M if still > 0.0 else _NEAR_M - left_m
+    rooms = rooms_m(model, data, robot, site_m + middle_m, closing, *reach_m)
+    if still == 0.0:
+        aside_m = 0.5 * (rooms[1] - rooms[0])
+    else:
+        to_still_m = rooms[1] if still > 0.0 else rooms[0]
+        data.qpos[robot.finger_positions] = _across(model, data, robot, travel)
+        mujoco.mj_kinematics(model, data)
+        beside_m = site_m + middle_m + still * (to_still_m - _STILL_M) * closing
+        room = rooms_m(model, data, robot, beside_m, closing, *reach_m)[0 if still > 0.0 else 1]
+        aside_m = still * (to_still_m - min(_NEAR_M, 0.5 * (room + BESIDE_M)))
     between_m: FloatArray = middle_m + aside_m * closing
-    return between_m
+    return between_m, across_m + aside_m
+
+
+def _across(model: Any, data: Any, robot: RobotModel, travel: GripperTravel) -> FloatArray:
+    """Return the fingers' widest positions (f,) at which no jaw is turned too far to push an object across the hand."""
+    turns = []
+    for fingers in (travel.closed_fingers, travel.open_fingers):
+        data.qpos[robot.finger_positions] = fingers
+        mujoco.mj_kinematics(model, data)
+        turns.append(Rotation.from_matrix(data.geom_xmat[robot.gripper_geoms].reshape(-1, 3, 3)))
+    turned_rad = float((turns[0].inv() * turns[1]).magnitude().max())
+    share = _ASKEW_RAD / max(turned_rad, _ASKEW_RAD)
+    across: FloatArray = travel.closed_fingers + share * (travel.open_fingers - travel.closed_fingers)
+    return across

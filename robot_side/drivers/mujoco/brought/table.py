@@ -12,6 +12,7 @@ import numpy as np
 from common.arrays import FloatArray
 from common.errors import ConfigurationError
 from robot_side.drivers.mujoco.brought.fingertips import (
+    BESIDE_M,
     INTO_M,
     LOW_INTO_M,
     closing_direction,
@@ -33,9 +34,6 @@ _DROPS_M: Final = (0.2, 0.25, 0.3, 0.35, 0.4, 0.5)
 _NEARER_M: Final = (0.0, 0.06, 0.11, 0.15, 0.18)
 _SPANNED: Final = 0.6
 """Largest share of the open gripper's gap that the target fills"""
-_BESIDE_M: Final = 0.013
-"""Least room between the target and each finger: 3 mm by which the spheres protrude, and 10 mm of the arm's and the
-camera's errors at the usual probability"""
 _LEVEL: Final = 0.5
 """Least horizontal part of the fingers' direction of closing at which the target turns"""
 _TARGET_M: Final = (0.0315, 0.02, 0.06)
@@ -47,6 +45,8 @@ _LOWEST_M: Final = 0.045
 """Least half height of the target: a hand from above grasps it 20 mm above its centre"""
 _LOW_M: Final = 0.03
 """Half height of the target for a hand of which only one jaw moves: as that turns, it presses on a higher one's top"""
+_SLIDES: Final = [0.3, 0.3, 0.01, 0.0005, 0.0005]
+"""Friction of that target on the table, about as of wood on wood: at 1 it would tip over where a jaw pushes it"""
 _IMPRATIO: Final = 30.0
 """Ratio at which the SO-101 places five of six targets; at 20 it places four (`feelahead try demo --seeds 6`)"""
 _SAMPLES: Final = 2000
@@ -132,10 +132,12 @@ def fit_target(table: Any, thick_m: float, lean: float = 0.0, *, low: bool = Fal
     whether only one jaw moves.
     """
     target, body = table.geom("target"), table.body("target")
-    most_m = max(0.5 * thick_m - lean * _TARGET_M[2], _THINNEST_M)
+    most_m = max(0.5 * thick_m - lean * (_LOW_M if low else _TARGET_M[2]), _THINNEST_M)
     length_m, width_m = min(_TARGET_M[0], most_m), min(_TARGET_M[1], most_m)
     height_m = _LOW_M if low else min(_TARGET_M[2], max(_SLIMMEST * width_m, _LOWEST_M))
     target.size, body.pos = [length_m, width_m, height_m], [*body.pos[:2], height_m]
+    if low and not table.pairs:
+        table.add_pair(geomname1="target", geomname2="table_top", friction=_SLIDES)
 
 
 def _find_place(
@@ -215,7 +217,7 @@ def _thickest_m(model: Any, robot: RobotModel, start: FloatArray, travel: Grippe
     data = _placed(model, start)
     closing, most_m = closing_direction(model, data, robot, travel), 0.5 * float(travel.openings_m[0])
     clear_m = 2.0 * min(rooms_m(model, data, robot, data.site_xpos[robot.site], closing, most_m, into_m))
-    return min(_SPANNED * clear_m, clear_m - 2.0 * _BESIDE_M)
+    return min(_SPANNED * clear_m, clear_m - 2.0 * BESIDE_M)
 
 
 def _has_still_jaw(model: Any, robot: RobotModel, start: FloatArray, travel: GripperTravel) -> bool:
