@@ -22,7 +22,8 @@ from feelahead.commands.open_browser import show_address
 from operator_side.viewing.facts import OperatorFacts
 
 _START_TIMEOUT_S = 600.0
-"""Time limit for a side to start, in seconds: the first start compiles kernels, for minutes on a busy machine."""
+"""Time, in seconds, for which a robot side that starts may say nothing. While it compiles, which takes many minutes on
+a very busy machine, it reports every few seconds."""
 _LINK_TIMEOUT_S = 30.0
 _WITHOUT_PAGES_S = 30.0
 """Duration of a run without pages, in seconds, unless --duration is given"""
@@ -152,8 +153,7 @@ def _watch(
 
     The run is over when its time is up, Ctrl-C comes, a side ends, or a page asks for another run.
     """
-    starting_s, waiting_since_s = time.monotonic(), None
-    said, lifetime = Said(), Lifetime(_duration_s(settings))
+    said, start, lifetime = Said(), Start(settings.link, time.monotonic()), Lifetime(_duration_s(settings))
     while not stop.is_set:
         now_s = time.monotonic()
         for side in (robot, operator):
@@ -167,16 +167,10 @@ def _watch(
         if page is not None and page.wants_again:
             break
         if not lifetime.has_begun:
-            # Count the link's time from when both sides report: a slow start of a process is no fault of the link.
             if said.operator is not None and said.operator.link is LinkState.UP:
                 lifetime.begin(now_s)
-            elif said.listens and said.operator is not None:
-                waiting_since_s = now_s if waiting_since_s is None else waiting_since_s
-                if now_s - waiting_since_s > _LINK_TIMEOUT_S:
-                    asked = f"; the reason may be --link {settings.link!r}" if settings.link else ""
-                    return [f"the sides did not find each other within {_LINK_TIMEOUT_S:g} s{asked}"]
-            elif now_s - starting_s > _START_TIMEOUT_S:
-                return [f"the sides did not start within {_START_TIMEOUT_S:g} s"]
+            elif (trouble := start.trouble(said, now_s)) is not None:
+                return [trouble]
         elif (why := lifetime.why_over(said.pages_since(), now_s)) is not None:
             status.note(why)
             break
@@ -201,6 +195,8 @@ class Said:
     operator: OperatorStatus | None = None
     listens: bool = False
     """Whether the robot side listens for an operator side"""
+    notes_of_robot: int = 0
+    """Number of lines of text from the robot side"""
     pages: int = 0
     """Number of open pages of the console"""
     most_pages: int = 0
@@ -210,6 +206,32 @@ class Said:
         """Return the greatest number of open pages since the last call: a page may open and close in between."""
         most, self.most_pages = self.most_pages, self.pages
         return most
+
+
+@dataclass
+class Start:
+    """Time limits of a start: until the robot side listens, it must go on reporting; then both must find each other."""
+
+    link: str
+    heard_s: float
+    """Time of the robot side's newest line of text"""
+    heard: int = 0
+    both_report_s: float | None = None
+    """Time since which both sides report: a slow start of a process is no fault of the link"""
+
+    def trouble(self, said: Said, now_s: float) -> str | None:
+        """Return why the start has failed; None as long as it has not."""
+        if said.listens and said.operator is not None:
+            self.both_report_s = now_s if self.both_report_s is None else self.both_report_s
+            if now_s - self.both_report_s <= _LINK_TIMEOUT_S:
+                return None
+            asked = f"; the reason may be --link {self.link!r}" if self.link else ""
+            return f"the sides did not find each other within {_LINK_TIMEOUT_S:g} s{asked}"
+        if said.notes_of_robot > self.heard:
+            self.heard_s, self.heard = now_s, said.notes_of_robot
+        if now_s - self.heard_s <= _START_TIMEOUT_S:
+            return None
+        return f"the sides have not started, and the robot side has said nothing for {_START_TIMEOUT_S:g} s"
 
 
 def take_events(side: SideProcess, said: Said, status: Status, page: KeptPage | None) -> None:
@@ -234,6 +256,7 @@ def take_events(side: SideProcess, said: Said, status: Status, page: KeptPage | 
         elif event["event"] == "again" and page is not None:
             page.wants_again = True
         else:
+            said.notes_of_robot += side.name == "robot"
             _show_note(side, event, status)
 
 

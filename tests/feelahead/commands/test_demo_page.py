@@ -16,9 +16,10 @@ from websockets.typing import Origin
 
 from common.command.status import Status
 from common.sockets.robot import RobotSockets
+from common.status.statuses import OperatorStatus
 from feelahead.both_sides.processes import SideProcess
 from feelahead.commands.demo.page import AFTER_PAGES_S, FIRST_PAGE_S, KeptPage, Lifetime, kept_addresses
-from feelahead.commands.demo.run import Said, take_events
+from feelahead.commands.demo.run import Said, Start, take_events
 from tests.helpers.machines.waiting import wait_until
 from tests.helpers.python_process import LIMIT_S
 from tests.operator_side.viewing.terminal.on_terminal import OnTerminal
@@ -125,6 +126,24 @@ def test_a_page_that_opens_and_closes_between_two_looks_has_been_open() -> None:
     said = Said()
     take_events(cast(SideProcess, Side()), said, Status("none", "demo"), None)
     assert [said.pages_since(), said.pages_since()] == [1, 0]
+
+
+def test_a_start_takes_as_long_as_the_robot_side_goes_on_reporting_and_a_link_half_a_minute() -> None:
+    class Side:
+        name = "robot"
+
+        def events(self) -> list[dict[str, object]]:
+            return [{"event": "note", "text": "compiling"}]
+
+    said, start, silent = Said(operator=OperatorStatus()), Start("delay 1s", 0.0), Start("", 0.0)
+    for now_s in range(0, 4000, 100):
+        take_events(cast(SideProcess, Side()), said, Status("none", "demo"), None)
+        assert start.trouble(said, float(now_s)) is None
+    assert silent.trouble(Said(operator=OperatorStatus()), 600.0) is None
+    assert "said nothing for 600 s" in (silent.trouble(Said(operator=OperatorStatus()), 601.0) or "")
+    said.listens = True
+    assert [start.trouble(said, now_s) for now_s in (5000.0, 5030.0)] == [None, None]
+    assert "--link 'delay 1s'" in (start.trouble(said, 5031.0) or "")
 
 
 @pytest.mark.processes
