@@ -138,7 +138,8 @@ class HidDualSense:
         try:
             while left > 0:
                 report = bytes(self._reading.read(_READ_LENGTH, _FIRST_REPORT_MS))
-                if stamp_of(report) not in (None, self._stamp):
+                if (stamp := stamp_of(report)) not in (None, self._stamp):
+                    self._stamp = stamp
                     return
                 left -= 1 if report else _MOST_REPEATS // _FIRST_REPORT_ATTEMPTS
         except OSError as error:

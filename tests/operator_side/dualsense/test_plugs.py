@@ -141,8 +141,10 @@ class Plugs(RuleBasedStateMachine):
     @precondition(lambda self: self.system.devices)
     @rule()
     def switch_off_or_on(self) -> None:
-        """Switch a controller off, whose dongle then repeats its last report, or all on again."""
-        self.system.off = set() if self.system.off else {min(self.system.devices)}
+        """Switch off the connected controller, whose dongle then repeats its last report, else all; or all on again."""
+        connected = None if self.connection.controller is None else self.connection.controller.path
+        off = {path for path in self.system.devices if connected in (None, path)}
+        self.system.off = set() if self.system.off else off
 
     @rule(turns=st.sampled_from([1, 10, 60, 300]))
     def go_on(self, turns: int) -> None:
