@@ -20,7 +20,10 @@ class Controller(Protocol):
         """Whether, as far as is known, the triggers do not resist and the motors do not run."""
 
     def read(self, now_s: float) -> ControllerState | None:
-        """Return the newest state, without waiting; None if there is no new state since the last call."""
+        """Return the newest state, without waiting; None if there is no new state since the last call.
+
+        After none for SILENT_S (`silence.py`) the controller counts as gone. A state that is only repeated is not new.
+        """
 
     def write(self, feel: Feel, now_s: float) -> None:
         """Set the parts of `feel` that are not None."""

@@ -1,7 +1,7 @@
-"""Layout of a gamepad: which of its axes are sticks and which are triggers, by what the kernel says of them.
+"""Layout of a gamepad: which axes are sticks and which are triggers, by what the kernel says of them.
 
-Linux has several conventions: its gamepad specification and the older drivers, which report the right stick as RX and
-RY, and HID's order, in which the right stick is Z and RZ.
+Linux has several conventions. By its gamepad specification, and in older drivers, RX and RY are the right stick. In
+HID's order Z and RZ are it.
 """
 
 from collections.abc import Iterable, Mapping
@@ -71,7 +71,7 @@ def is_controller(keys: set[int]) -> bool:
 
 
 def layout_of(keys: set[int], axes: Mapping[int, Axis], *, rumbles: bool) -> Layout | str:
-    """Return the layout of a gamepad with these keys and axes, or in words what it lacks, with its axes."""
+    """Return the layout of a gamepad with these keys and axes; one that does not fit: in words, what is missing."""
     usable = {code for code, axis in axes.items() if axis.most > axis.least}
     pads = {code for code in usable if code >= HAT_X and axes[code].least < 0}
     rights = _RIGHTS[::-1] if _in_order_of_hid(keys, axes, usable) else _RIGHTS

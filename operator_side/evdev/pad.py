@@ -99,7 +99,7 @@ class EvdevPad:
             self.layout = found if isinstance(found, Layout) else None
             """Axes of sticks and triggers; None if the device cannot be used."""
             self.lacks = "" if isinstance(found, Layout) else found
-            """What a device that cannot be used lacks, in words."""
+            """Missing parts of a device that cannot be used, in words, with the axes that it has."""
             self._values: dict[int, int] = {}
             self._down: set[int] = set()
             if self.is_pad:
