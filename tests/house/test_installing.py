@@ -49,6 +49,13 @@ COMMANDS = {
     },
     "robot": {"feelahead-robot --bind tcp://127.0.0.1:0 --duration 0.5 --status none": ""},
     "operator": {"feelahead-operator --connect tcp://127.0.0.1:9 --device simulated --duration 0.5": ""},
+    "record": {
+        "feelahead-operator --device simulated --duration 2 --status none --record {folder}/run.mcap": "",
+        "feelahead export {folder}/run.mcap": "",
+        "feelahead replay {folder}/run.mcap --check": "",
+        "feelahead plot {folder}/run.mcap": "pip install '.[experiments]'",
+        "feelahead export {folder}/run.mcap --format parquet": "pip install '.[experiments]'",
+    },
 }
 """Commands by extra, and what each that needs another extra says"""
 RUNS = """
