@@ -7,6 +7,8 @@ from typing import Literal
 
 from rich.console import Console
 
+from feelahead.printing.figures import short
+
 
 @dataclass(frozen=True)
 class Goal:
@@ -37,14 +39,3 @@ def show_goals(console: Console, goals: Iterable[Goal]) -> None:
             f"{goal.verdict:<13}{goal.claim}: {value}, {goal.compare} {short(goal.limit)} asked{detail}",
             style={"met": "green", "missed": "red"}.get(goal.verdict, "yellow"),
         )
-
-
-def short(value: float) -> str:
-    """Return `value` as text with two to four digits: 0.00123 as 1.2e-03, 0.123 as 0.123, 1234.5 as 1234."""
-    if value == 0.0 or not math.isfinite(value):
-        return f"{value:g}"
-    if value == int(value) and abs(value) < 1e7:
-        return str(int(value))
-    if 1000.0 <= abs(value) < 1e7:
-        return f"{value:.0f}"
-    return f"{value:.3g}" if 0.01 <= abs(value) < 1000.0 else f"{value:.1e}"

@@ -12,10 +12,11 @@ from pathlib import Path
 from statistics import fmean, median
 from typing import Any, Final
 
-from feelahead.lab.goals import Goal, short
+from feelahead.lab.goals import Goal
 from feelahead.lab.intervals import mean_interval
 from feelahead.lab.questions import haptics, tick
 from feelahead.lab.table import Table
+from feelahead.printing.figures import short
 
 ROOT: Final = Path(__file__).parents[2]
 DOCUMENT: Final = ROOT / "docs" / "measurements.md"

@@ -14,8 +14,8 @@ import numpy as np
 
 from common.errors import ConfigurationError, FeelaheadError
 from feelahead.lab.executors import cluster, processes
-from feelahead.lab.progress import Shown
 from feelahead.lab.table import Row
+from feelahead.printing.progress import Shown
 
 _WORKERS = 2
 

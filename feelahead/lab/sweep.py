@@ -29,8 +29,8 @@ from feelahead.lab.figures import PICTURES
 from feelahead.lab.goals import Goal, show_goals
 from feelahead.lab.journal import Journal
 from feelahead.lab.pieces import Piece, results
-from feelahead.lab.progress import progress
 from feelahead.lab.table import Row, Table
+from feelahead.printing.progress import progress
 
 _ROOT = Path(__file__).parents[2]
 _PACKAGES = ("common", "operator_side", "robot_side", "feelahead")

@@ -128,9 +128,11 @@ ARROWS = """
     feelahead/both_sides: common/* robot_side/* operator_side/*
     feelahead/recordings: common/* robot_side/* operator_side/*
     feelahead/containers: common/* feelahead/both_sides
-    feelahead/lab: common/* robot_side/* operator_side/* feelahead/both_sides feelahead/containers
+    feelahead/printing: common
+    feelahead/lab: common/* robot_side/* operator_side/* feelahead/both_sides feelahead/containers feelahead/printing
+    feelahead/commands/bench_and_try.py: common feelahead/lab
     feelahead/commands: common/* robot_side/compiled robot_side/laws/named.py robot_side/viewing operator_side/*
-        feelahead/lab feelahead/both_sides feelahead/recordings
+        feelahead/both_sides feelahead/printing feelahead/recordings
     feelahead: common/*
 """
 """One row for each room: the room, and the rooms that it may import.
@@ -175,6 +177,7 @@ LIBRARIES = {
         "feelahead/lab",
         "feelahead/both_sides",
         "feelahead/commands",
+        "feelahead/printing",
     ),
 }
 """Rooms and files that may import each library, or use a clock"""

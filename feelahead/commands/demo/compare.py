@@ -17,6 +17,8 @@ from common.errors import ConfigurationError
 from common.files.output_file import write_json
 from feelahead.commands.demo.settings import DemoSettings
 from feelahead.commands.open_browser import show_address
+from feelahead.printing.figures import shown
+from feelahead.printing.progress import progress
 
 _TAKEN: Final = {
     *("compare", "config", "console", "console_port", "duration", "link", "link_model"),
@@ -64,10 +66,9 @@ def compute(settings: DemoSettings, *, pictures: bool | None = None) -> list[dic
     pictures: whether to draw; by default if the page is shown.
     """
     try:
-        # The lab and the robot side may be missing, and take long to import.
+        # The robot side may be missing, and takes long to import.
+        from feelahead.both_sides.grasping_trial import MISJUDGES_DEPTH, Trial  # noqa: PLC0415
         from feelahead.commands.demo.compared_run import compared_run  # noqa: PLC0415
-        from feelahead.lab.progress import progress  # noqa: PLC0415
-        from feelahead.lab.trial import MISJUDGES_DEPTH, Trial  # noqa: PLC0415
     except ModuleNotFoundError as error:
         why = f"--compare: {error.name} is not installed; pip install '.[robot,operator]' in the clone"
         raise ConfigurationError(why) from error
@@ -107,8 +108,6 @@ def _what(settings: DemoSettings) -> str:
 
 
 def _table(runs: list[dict[str, Any]]) -> Table:
-    from feelahead.lab.shown import shown  # noqa: PLC0415  # of the lab
-
     headings = "haptics", "contact", "mm/s, most", "least gap, mm", "placed", "finished, s"
     rows = zip(("off", "on"), runs, strict=True)
     return shown("", headings, ((name, *_cells(run["figures"])) for name, run in rows))

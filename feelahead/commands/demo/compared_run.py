@@ -9,7 +9,7 @@ from typing import Any, Final
 import numpy as np
 
 from common.companion.process import Companion
-from feelahead.lab.trial import LOOK_S, R2, Trial, Watch, run_trial
+from feelahead.both_sides.grasping_trial import LOOK_S, R2, Trial, Watch, run_trial
 from operator_side.controller.feel import MAX_STRENGTH
 from robot_side.viewing.exchange import (
     Order,

@@ -26,9 +26,9 @@ from feelahead.lab.approaches.laws import Law, compensation_of, in_words, with_c
 from feelahead.lab.approaches.links import mean_loop_s, require_young_loop
 from feelahead.lab.approaches.outcome import Outcome
 from feelahead.lab.figures import LAW_COLOURS, figure
-from feelahead.lab.shown import shown
 from feelahead.lab.sweep import Question, Sweep
 from feelahead.lab.table import Row, Table
+from feelahead.printing.figures import shown
 from robot_side.drivers.mujoco.robot_model import SiteAxis
 from robot_side.settings import Assist
 

@@ -20,9 +20,9 @@ from feelahead.lab.approaches.frozen import AHEAD, PASSED, frozen_hash
 from feelahead.lab.approaches.laws import LAWS, Law
 from feelahead.lab.approaches.pulls import PULL_KINDS, PullKind
 from feelahead.lab.figures import LAW_COLOURS, figure
-from feelahead.lab.shown import shown
 from feelahead.lab.sweep import Question, Sweep
 from feelahead.lab.table import Row, Table
+from feelahead.printing.figures import shown
 
 HOMES: Final = {"u_mesh": "mug", "mug": "mug"}
 """Scenes whose home pose differs from that of `empty`, with the scene in which their approaches are recorded."""

@@ -13,11 +13,11 @@ from msgspec import Meta
 from rich.table import Table as Shown
 
 from common.emulation.clauses import LinkModel
+from feelahead.both_sides.grasping_trial import Trial, run_trial
 from feelahead.lab.approaches.links import require_young_loop
-from feelahead.lab.shown import shown
 from feelahead.lab.sweep import Question, Sweep
 from feelahead.lab.table import Row, Table
-from feelahead.lab.trial import Trial, run_trial
+from feelahead.printing.figures import shown
 from operator_side.people.settings import PersonSettings
 from robot_side.drivers.mujoco.built_in_scenes import SceneName
 from robot_side.drivers.mujoco.robot_model import SiteAxis

@@ -28,9 +28,9 @@ from feelahead.lab.approaches.pulls import PULL_KINDS, PullKind
 from feelahead.lab.approaches.recording import record_approach
 from feelahead.lab.figures import figure
 from feelahead.lab.posed_gripper import PosedGripper
-from feelahead.lab.shown import shown
 from feelahead.lab.sweep import Question, Sweep
 from feelahead.lab.table import Row, Table
+from feelahead.printing.figures import shown
 from robot_side.arm.tool_motion import ToolMotionSettings
 from robot_side.drivers.mujoco.joint_reference import MotionLimits
 from robot_side.drivers.mujoco.scene import load_scene

@@ -19,9 +19,9 @@ from feelahead.lab.approaches.ticks import DEMO, record
 from feelahead.lab.cover import STANDS_OUT, Gripper, draw_cover, measure_cover
 from feelahead.lab.goals import Goal
 from feelahead.lab.reference.looks import LATE_M, compare, looks_of
-from feelahead.lab.shown import shown
 from feelahead.lab.sweep import Question, Sweep
 from feelahead.lab.table import Row, Table
+from feelahead.printing.figures import shown
 from robot_side.settings import RobotSettings
 
 _LIMIT_COVER_MM: Final = 1e3 * RobotSettings().cover_m

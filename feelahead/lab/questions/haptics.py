@@ -17,11 +17,11 @@ from msgspec import Meta
 from rich.table import Table as Shown
 
 from common.emulation.clauses import LinkModel
+from feelahead.both_sides.grasping_trial import MISJUDGES_DEPTH, Arm, Trial, run_trial
 from feelahead.lab.intervals import mcnemar_p, mean_interval, share_interval
-from feelahead.lab.shown import shown
 from feelahead.lab.sweep import Question, Sweep
 from feelahead.lab.table import Row, Table
-from feelahead.lab.trial import MISJUDGES_DEPTH, Arm, Trial, run_trial
+from feelahead.printing.figures import shown
 from operator_side.people.settings import PersonSettings
 from robot_side.drivers.mujoco.built_in_scenes import SceneName
 

@@ -31,9 +31,9 @@ from feelahead.containers.medium import ContainerMedium
 from feelahead.lab.approaches.links import require_young_loop
 from feelahead.lab.figures import figure
 from feelahead.lab.intervals import student_interval, welch_interval
-from feelahead.lab.shown import shown
 from feelahead.lab.sweep import Question, Sweep
 from feelahead.lab.table import Row, Table
+from feelahead.printing.figures import shown
 from operator_side.settings import OperatorSettings
 from robot_side.settings import RobotSettings
 

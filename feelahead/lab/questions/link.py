@@ -24,9 +24,9 @@ from common.emulation.spec import LinkSpec
 from feelahead.lab.goals import Goal
 from feelahead.lab.link.pair import Kind, pair
 from feelahead.lab.link.samples import band_of, compare_one, judge, needs_band, pair_of_runs, play, read_link_sample
-from feelahead.lab.shown import shown
 from feelahead.lab.sweep import Question, Sweep, cell_of
 from feelahead.lab.table import Row, Table
+from feelahead.printing.figures import shown
 
 _BARE_LIMIT: Final = 1.3
 _KINDS: Final[tuple[Kind, ...]] = ("whole ends", "bare ZeroMQ")

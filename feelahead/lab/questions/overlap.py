@@ -27,10 +27,10 @@ from feelahead.lab.reference.meshes import around_torus, torus
 from feelahead.lab.reference.oracle import true_overlaps
 from feelahead.lab.reference.pairs import Pairs
 from feelahead.lab.reference.published import SDIST, CompiledHeader, PythonPackage
-from feelahead.lab.shown import shown
 from feelahead.lab.sweep import Question, Sweep
 from feelahead.lab.table import Row, Table
 from feelahead.lab.turns import in_turns, least_ns
+from feelahead.printing.figures import shown
 from robot_side.overlap import Mesh, sphere_box, sphere_tetrahedron
 
 OURS, KERNEL, PACKAGE, HEADER = "ours, checked", "ours, kernel", "overlap, Python", "overlap, C++"

@@ -19,12 +19,12 @@ from common.errors import FeelaheadError
 from feelahead.both_sides.real_time import run_for, started
 from feelahead.lab.approaches.frozen import frozen_scene
 from feelahead.lab.goals import Goal
-from feelahead.lab.shown import shown
 from feelahead.lab.sweep import Question, Sweep
 from feelahead.lab.table import Row, Table
 from feelahead.lab.tick.concave import time_looks
 from feelahead.lab.tick.mixed import as_ratios
 from feelahead.lab.tick.timed_robot import COLUMNS, PROGRAM, STAGES
+from feelahead.printing.figures import shown
 
 _SETTLING_S: Final = 1.0
 """Time in seconds after which both sides are connected and each kernel has run."""

@@ -11,10 +11,9 @@ from typing import Annotated, Final, Literal
 import tyro
 from rich.console import RenderableType
 
-from feelahead.lab.goals import short
-from feelahead.lab.shown import shown
 from feelahead.lab.sweep import Question, Sweep
 from feelahead.lab.table import Row, Table
+from feelahead.printing.figures import short, shown
 from tests.two_hosts.wide_area.running import run_trial
 from tests.two_hosts.wide_area.trial import Trial
 

@@ -15,9 +15,9 @@ from rich.console import RenderableType
 from common.emulation.spec import LinkSpec
 from common.limits import Limited
 from feelahead.lab.link.samples import play
-from feelahead.lab.shown import shown
 from feelahead.lab.sweep import Question, Sweep
 from feelahead.lab.table import Row, Table
+from feelahead.printing.figures import shown
 from tests.two_hosts.wide_area.messages import PAYLOAD_BYTES, ages
 from tests.two_hosts.wide_area.tunnels import WideArea
 from tests.two_hosts.wide_area.wire_direction import DirectionSettings

@@ -4,14 +4,13 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Final, Literal
+from typing import Any, Final, Literal
 
 from common.emulation.clauses import LinkModel
 from common.protocol.around import Around
 from common.protocol.uniform_field import uniform_field
 from common.roles import Role
 from feelahead.both_sides.loopback import Loopback, LoopbackSettings, robot_parts
-from feelahead.lab.table import Row
 from operator_side.controller.feel import MAX_STRENGTH
 from operator_side.dualsense.simulated.trigger_model import zone_of
 from operator_side.people.person import SimulatedOperator
@@ -166,7 +165,7 @@ class Watch(Listener):
         return device.strengths[trigger][zone_of(travel)] if travel > 0.0 else None
 
 
-def run_trial(trial: Trial, seed: int, look: Callable[[Watch], None] = lambda _: None) -> Row:
+def run_trial(trial: Trial, seed: int, look: Callable[[Watch], None] = lambda _: None) -> dict[str, Any]:
     """Run until the person is done, or until the trial's duration is over. The same trial and seed give the same row.
 
     From the seed the scene, the errors of camera and encoders, the link's delays and the person are drawn.

@@ -1,0 +1,1 @@
+"""Progress of long work and tables of figures, as they are printed."""
