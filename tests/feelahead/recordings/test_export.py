@@ -182,6 +182,27 @@ def test_an_operator_side_alone_knows_by_its_clock_offset_how_old_a_picture_is(t
     assert [one.time_s - one.captured_s for one in found] == pytest.approx([0.02, 0.07], abs=1e-6)
 
 
+def test_pictures_that_arrived_at_one_moment_keep_their_own_messages(tmp_path: Path) -> None:
+    path = tmp_path / "operator.mcap"
+    file = RecordingFile(path, 0.0)
+    content = Content(file)
+    content.take(0, HEADER + as_json({"side": "operator"}))
+    sent = [
+        VideoFrame(Header(1, number, 10.0), "overview", 10.0 - age_s, 32, 24, jpeg)
+        for number, (age_s, jpeg) in enumerate(((0.07, b"first"), (0.03, b"second")), start=1)
+    ]
+    for frame in sent:
+        content.take(0, VIEW + stamped(1.0) + encode(frame))
+    file.close()
+
+    recording = open_recording(path)
+
+    assert [decode_view(one.content) for one in seen(recording)] == sent
+    found = read_pictures(recording)["overview"]
+    assert [one.jpeg for one in found] == [b"first", b"second"]
+    assert [one.time_s - one.captured_s for one in found] == pytest.approx([0.07, 0.03], abs=1e-6)
+
+
 def test_lerobot_has_an_episode_for_each_that_was_marked_and_kept(
     run: Recording,
     with_pictures: tuple[Recording, list[bytes]],
