@@ -32,6 +32,11 @@ def refuse_processes(event: str, arguments: tuple[Any, ...]) -> None:
 sys.addaudithook(refuse_processes)
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Let the longest tests begin first, so that no worker is left alone with one of them in the end."""
+    items.sort(key=lambda item: not any(map(item.get_closest_marker, ("processes", "install", "long"))))
+
+
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_protocol(item: pytest.Item) -> Iterator[None]:
     if item.get_closest_marker("processes") is None and item.get_closest_marker("install") is None:

@@ -10,7 +10,7 @@ from common.realtime.pacing import Pacer, wait_for_turn
 from common.sockets.robot import RobotSockets
 from tests.helpers.felt import felt
 
-TICK_PERIOD_S = 1e-3
+TICK_PERIOD_S = 4e-3
 """Period of the stiffness messages, in seconds"""
 _NOTICE_PERIOD_S = 0.05
 
@@ -56,7 +56,7 @@ class StiffnessSource:
         return self._peer is not None
 
     def run(self, duration_s: float) -> None:
-        """For `duration_s`, answer messages and send stiffness every millisecond."""
+        """For `duration_s`, answer messages and send stiffness every 4 ms."""
         self._pacer.restart(self._clock.now())
         end_s = self._clock.now() + duration_s
         while (now_s := self._clock.now()) < end_s:

@@ -166,7 +166,7 @@ def world(tmp_path: Path) -> Iterator[World]:
         yield made
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGKILL])
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL])
 def test_however_it_ends_the_triggers_are_released(world: World, number: signal.Signals) -> None:
     world.stiffen()
     world.process.send_signal(number)

@@ -13,7 +13,7 @@ from feelahead.both_sides.processes import SideProcess
 from tests.helpers.python_process import LIMIT_S, ended
 
 pytestmark = pytest.mark.processes
-STRANGERS = 1400
+STRANGERS = 400
 LATE = """
 import sys
 from robot_side import main
@@ -27,7 +27,7 @@ main.command(sys.argv[1:], lambda parts: (parts, [Late()]))
 """Robot side with a listener of others that uses a part of the library in every tick"""
 FEW = """
 import os, resource, sys
-resource.setrlimit(resource.RLIMIT_NOFILE, (1024, 1024))
+resource.setrlimit(resource.RLIMIT_NOFILE, (256, 256))
 os.execv(sys.argv[1], sys.argv[1:])
 """
 

@@ -16,7 +16,7 @@ from tests.helpers.perceived_scenes import random_rotation
 
 STAND_OUT_M = 0.003
 size = st.floats(0.004, 0.03)
-few, several = (settings(derandomize=True, deadline=None, max_examples=count) for count in (4, 10))
+few, several = (settings(derandomize=True, deadline=None, max_examples=count) for count in (3, 5))
 
 
 def points_on(solid: Solid, random: np.random.Generator, count: int = 20_000) -> FloatArray:
@@ -112,7 +112,7 @@ def test_the_spheres_are_mirror_symmetric_where_the_shape_is() -> None:
 
 
 def test_the_same_twice_and_what_would_need_too_many_stands_out_farther() -> None:
-    solid = cylinder(0.02, 0.02)
+    solid = cylinder(0.01, 0.01)
     assert solid is not None
     first, second = (cover_surface([solid], STAND_OUT_M) for _ in range(2))
     np.testing.assert_array_equal(first[0], second[0])
