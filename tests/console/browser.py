@@ -11,7 +11,7 @@ import numpy as np
 from PIL import Image
 
 from tests.console.provide import provide_playwright, provided_browser
-from tests.helpers.machines.waiting import wait_until
+from tests.helpers.machines.waiting import LIMIT_S, wait_until
 
 _ARGUMENTS: Final = (
     "--no-sandbox",  # Root has no sandbox.
@@ -21,8 +21,8 @@ _ARGUMENTS: Final = (
 )
 SMALL: Final = (1280, 720)
 LARGE: Final = (1920, 1080)
-_LIMIT_MS: Final = 60_000
-"""Time limit of one step of the browser in milliseconds, long enough for a busy machine"""
+_LIMIT_MS: Final = 1e3 * LIMIT_S
+"""Time limit of one step of the browser in milliseconds"""
 _DRAWS_SCENE: Final = "button#drawn[aria-pressed={}]"
 _BRIGHTNESS: Final = (0.2126, 0.7152, 0.0722)
 _FAKE_GAMEPAD: Final = """
@@ -92,7 +92,7 @@ class Page:
         """Evaluate a piece of JavaScript in the page, and return its value."""
         return self.raw.evaluate(script, argument)
 
-    def wait(self, script: str, what: str, limit_s: float = 20.0) -> None:
+    def wait(self, script: str, what: str, limit_s: float = LIMIT_S) -> None:
         """Wait until a piece of JavaScript is true; AssertionError after `limit_s`. what: its name in this error."""
         # Evaluated from here: the page's policy forbids Playwright's own waiting within the page.
         try:
@@ -101,7 +101,7 @@ class Page:
             self.picture("unexpected")
             raise
 
-    def wait_for_text(self, selector: str, words: str, limit_s: float = 20.0) -> None:
+    def wait_for_text(self, selector: str, words: str, limit_s: float = LIMIT_S) -> None:
         """Wait until an element contains `words`, in upper or lower case."""
         script = f"document.querySelector({selector!r})?.textContent.toLowerCase().includes({words.lower()!r})"
         self.wait(script, f"{words!r} in {selector}", limit_s)

@@ -75,9 +75,9 @@ def fed_page(browser: Browser, size: tuple[int, int] = SMALL) -> Iterator[tuple[
     thread = threading.Thread(target=fed.feed)
     thread.start()
     try:
-        wait_until("a console's address", lambda: fed.address, 60.0)
+        wait_until("a console's address", lambda: fed.address)
         with browser.page(str(fed.address), size) as page:
-            page.wait(f"{AGE} == 'fresh'", "fresh pictures", 30.0)
+            page.wait(f"{AGE} == 'fresh'", "fresh pictures")
             yield fed, page
     finally:
         fed.ends.set()

@@ -10,14 +10,12 @@ from contextlib import contextmanager
 from typing import Any, Final
 
 from feelahead.both_sides.processes import StartedSide
-from tests.helpers.machines.waiting import wait_until
+from tests.helpers.machines.waiting import LIMIT_S, wait_until
 
 Event = dict[str, Any]
 STATE: Final = "document.body.dataset.state"
 DRAWN: Final = "['overview', 'first_person'].every((view) => document.getElementById(view).dataset.frames > 2)"
 """JavaScript condition: pictures of both cameras have come"""
-_START_S: Final = 300.0
-"""Time limit of the demo's start in seconds: the first start on a machine compiles the kernels"""
 _KEPT: Final = 400
 
 
@@ -48,7 +46,7 @@ class Run:
                 self.notes.append(event["text"])
         self._demo.check()
 
-    def wait_until(self, what: str, holds: Callable[["Run"], object], limit_s: float = 30.0) -> float:
+    def wait_until(self, what: str, holds: Callable[["Run"], object], limit_s: float = LIMIT_S) -> float:
         """Wait until `holds` is true; return the seconds it took. AssertionError with `what` after `limit_s`."""
         began_s = time.monotonic()
 
@@ -80,6 +78,6 @@ def running(arguments: Sequence[str]) -> Iterator[Run]:
     command = [sys.executable, "-P", "-m", "feelahead", "demo", "--status", "facts", "--duration", "3600", *arguments]
     with StartedSide("demo", command) as demo:
         run = Run(demo)
-        run.wait_until("a console's address", lambda run: run.address, _START_S)
-        run.wait_until("linked", lambda run: run.status.get("link") == "up", _START_S)
+        run.wait_until("a console's address", lambda run: run.address)
+        run.wait_until("linked", lambda run: run.status.get("link") == "up")
         yield run

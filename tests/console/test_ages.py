@@ -15,14 +15,14 @@ def test_old_pictures_are_amber_in_a_corner_and_keep_their_colours_and_dead_ones
     with fed_page(browser) as (fed, page):
         fed.age_s = 2.0
         fed.pictures = PictureFacts((0.4,) * 2, (OLD_S,) * 2)
-        page.wait(f"{AGE} == 'old'", "amber", 30.0)
+        page.wait(f"{AGE} == 'old'", "amber")
         looks = "getComputedStyle(document.querySelector('#overview {}')).{}"
         assert page.ask(looks.format(".age", "backgroundColor")) == "rgb(255, 193, 77)"
         assert page.ask(looks.format("canvas", "filter + getComputedStyle(document.body).opacity")) == "none1"
         assert not page.raw.is_visible("#overview .dead")
         page.picture("pictures-old")
         fed.sends, fed.pictures = False, PictureFacts((OLD_S,) * 2, (0.5,) * 2)
-        page.wait_for_text("#overview .dead", "NO NEW PICTURE for 2", 30.0)
+        page.wait_for_text("#overview .dead", "NO NEW PICTURE for 2")
         assert page.ask(AGE) == "dead"
         assert page.raw.is_visible("#overview .dead")
         page.picture("pictures-dead")
@@ -36,7 +36,7 @@ def test_the_border_says_that_hands_are_off_until_they_count_again(browser: Brow
             assert page.raw.is_visible("#hands_off")
         page.picture("hands-off")
         fed.page = msgspec.structs.replace(fed.page, counts=1.0)
-        page.wait("document.querySelector('#hands_off').hidden", "hands that count", 20.0)
+        page.wait("document.querySelector('#hands_off').hidden", "hands that count")
 
 
 def test_after_a_stop_only_the_reset_lets_hold_to_run_count(browser: Browser) -> None:

@@ -8,7 +8,7 @@ from tests.console.browser import Browser, Page
 from tests.console.run import Run
 
 LINK = ()
-pytestmark = [pytest.mark.console, pytest.mark.processes]
+pytestmark = [pytest.mark.console, pytest.mark.processes, pytest.mark.quiet]
 
 
 def test_space_drives(browser: Browser, demo: Run) -> None:
@@ -16,30 +16,30 @@ def test_space_drives(browser: Browser, demo: Run) -> None:
     with browser.page(demo.address) as page:
         take_over(page, demo)
         with page.held("Space"):
-            page.wait_for_text("#hands_state", "You drive", 15.0)
+            page.wait_for_text("#hands_state", "You drive")
             with page.held("KeyW"):
-                demo.wait_until("pulled", lambda run: pull(run) > 0.1, 5.0)
+                demo.wait_until("pulled", lambda run: pull(run) > 0.1)
                 page.picture("hands")
-            demo.wait_until("let go", lambda run: pull(run) == 0.0, 5.0)
-        demo.wait_until("disarmed or at rest", lambda run: not _runs(run), 5.0)
+            demo.wait_until("let go", lambda run: pull(run) == 0.0)
+        demo.wait_until("disarmed or at rest", lambda run: not _runs(run))
 
 
 def test_a_key_marks_an_episode(browser: Browser, demo: Run) -> None:
     """N starts an episode, though a scripted person drives; the page stays connected."""
     with browser.page(demo.address) as page:
-        page.wait("document.querySelector('#drive:enabled') !== null", "a page with facts", 20.0)
+        page.wait("document.querySelector('#drive:enabled') !== null", "a page with facts")
         page.press("KeyN")
-        demo.wait_until("marked", lambda run: "operator: episode: start" in run.notes, 10.0)
+        demo.wait_until("marked", lambda run: "operator: episode: start" in run.notes)
 
 
 def test_escape_stops(browser: Browser, fresh_demo: Run) -> None:
     """Esc stops whoever drives: here the scripted person, while another element of the page has the focus."""
     with browser.page(fresh_demo.address) as page:
-        fresh_demo.wait_until("armed", is_armed, 60.0)
+        fresh_demo.wait_until("armed", is_armed)
         page.press("Tab")
         page.press("Escape")
-        fresh_demo.wait_until("stopped", lambda run: not is_armed(run), 5.0)
-        page.wait("document.body.dataset.state != 'armed'", "shown as stopped", 5.0)
+        fresh_demo.wait_until("stopped", lambda run: not is_armed(run))
+        page.wait("document.body.dataset.state != 'armed'", "shown as stopped")
         words = page.text("#state")
         page.picture("stopped")
         assert "ARMED" not in words.replace("DISARMED", "")
@@ -47,10 +47,10 @@ def test_escape_stops(browser: Browser, fresh_demo: Run) -> None:
 
 def take_over(page: Page, run: Run) -> None:
     """Ask to drive from the page, and press no key until the page may drive."""
-    page.wait("document.querySelector('#drive:enabled') !== null", "a button to drive by", 20.0)
+    page.wait("document.querySelector('#drive:enabled') !== null", "a button to drive by")
     page.raw.click("#drive")
-    run.wait_until("the page's hands", lambda run: _newest(run)["hands"] == "browser", 10.0)
-    page.wait_for_text("#hands_state", "Ready", 15.0)
+    run.wait_until("the page's hands", lambda run: _newest(run)["hands"] == "browser")
+    page.wait_for_text("#hands_state", "Ready")
 
 
 def _newest(run: Run) -> dict[str, Any]:

@@ -48,7 +48,7 @@ def test_nothing_overflows(browser: Browser, demo: Run, size: tuple[int, int]) -
             _inside(page, selector, size)
         assert min(widths) >= 0.3 * size[0]
         page.raw.click("#drive")
-        demo.wait_until("the page's hands", lambda run: run.facts[-1]["hands"] == "browser", 10.0)
+        demo.wait_until("the page's hands", lambda run: run.facts[-1]["hands"] == "browser")
         for selector in ("#hands", "#tuning"):
             _inside(page, selector, size)
         page.picture(f"page-{size[0]}x{size[1]}")
@@ -59,7 +59,7 @@ def test_small_windows_cut_nothing_and_keep_stop_and_triggers_in_view(browser: B
     """Also 200 % zoom, 640x360: scrolling and notes move neither stop nor triggers out of it, and all can be read."""
     with fed_page(browser, size) as (fed, page):
         fed.notes = [f"note {number}: something has happened that takes a line or two" for number in range(40)]
-        page.wait("document.querySelectorAll('#notes li').length >= 40", "notes", 20.0)
+        page.wait("document.querySelectorAll('#notes li').length >= 40", "notes")
         for place in ("#overview", "#notes", "#charts", "#terms"):
             page.raw.locator(place).scroll_into_view_if_needed()
             for selector in ("#stop", "#r2", "#l2"):

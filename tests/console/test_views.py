@@ -30,6 +30,7 @@ _LINE = """(view) => {
 }"""
 
 
+@pytest.mark.quiet
 def test_both_views_move(browser: Browser, fresh_demo: Run) -> None:
     """The pictures of both cameras are drawn, not empty, and change; the page shows their age."""
     with browser.page(fresh_demo.address) as page:
@@ -45,6 +46,7 @@ def test_both_views_move(browser: Browser, fresh_demo: Run) -> None:
         page.picture("views")
 
 
+@pytest.mark.quiet
 def test_scene_is_drawn(browser: Browser, fresh_demo: Run) -> None:
     """The drawing of the scene is not empty."""
     with browser.page(fresh_demo.address, scene=True) as page:
@@ -55,11 +57,12 @@ def test_scene_is_drawn(browser: Browser, fresh_demo: Run) -> None:
         page.picture("scene")
 
 
+@pytest.mark.quiet
 def test_triggers_agree(browser: Browser, fresh_demo: Run) -> None:
     """Numbers and bars of the ten zones show the strengths that the operator side wrote to the controller."""
     with browser.page(fresh_demo.address) as page:
         page.wait("document.querySelectorAll('#r2 .zones b').length == 10", "drawn the zones")
-        fresh_demo.wait_until("armed", lambda run: run.status.get("state") == "armed", 60.0)
+        fresh_demo.wait_until("armed", lambda run: run.status.get("state") == "armed")
         script = """() => ['l2', 'r2'].map((side) => [...document.querySelectorAll(`#${side} .zones div`)]
             .map((zone) => {
             const bar = zone.querySelector('i').getBoundingClientRect();

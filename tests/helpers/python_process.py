@@ -4,10 +4,8 @@ import os
 import subprocess
 import sys
 
+from tests.helpers.machines.waiting import LIMIT_S
 from tests.helpers.repository import ROOT
-
-LIMIT_S = 600.0
-"""Time limit of a process in seconds, long enough for a busy machine"""
 
 
 def start(*arguments: str, **environment: str) -> "subprocess.Popen[str]":

@@ -9,8 +9,8 @@ from common.sockets.robot import RobotSockets
 
 EPHEMERAL = "tcp://127.0.0.1:0"
 PATIENT_S = 60.0
-"""Time-out in seconds that even a busy machine does not exceed"""
-ROUNDS = 6000
+"""Longest silence of a connection in seconds"""
+ROUNDS = 60_000
 """Number of waits of 10 ms after which a test gives up."""
 
 

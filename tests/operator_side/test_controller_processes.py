@@ -17,7 +17,8 @@ import pytest
 
 from operator_side.controller.feel import FREE_TRIGGER, RELEASED, WARNING_LIGHT, Feel
 from operator_side.dualsense.reports.output_report import parse_output_report
-from tests.helpers.python_process import LIMIT_S, ended
+from tests.helpers.machines.waiting import LIMIT_S
+from tests.helpers.python_process import ended
 from tests.helpers.repository import ROOT
 from tests.operator_side.stiffness_source import StiffnessSource
 

@@ -10,7 +10,8 @@ from pathlib import Path
 import pytest
 
 from feelahead.both_sides.processes import SideProcess
-from tests.helpers.python_process import LIMIT_S, ended
+from tests.helpers.machines.waiting import LIMIT_S
+from tests.helpers.python_process import ended
 
 pytestmark = pytest.mark.processes
 STRANGERS = 400

@@ -11,7 +11,8 @@ import pytest
 from common.protocol.view_messages import SceneShapes, SceneState, VideoFrame, VideoStep
 from feelahead.both_sides.processes import SideProcess
 from feelahead.both_sides.summary import read_summary
-from tests.robot_side.viewing.viewer import LIMIT_S, Seen, Viewer, companion_of
+from tests.helpers.machines.waiting import LIMIT_S
+from tests.robot_side.viewing.viewer import Seen, Viewer, companion_of
 
 pytestmark = pytest.mark.processes
 

@@ -2,7 +2,6 @@
 
 import contextlib
 import os
-import re
 import shlex
 import shutil
 import signal
@@ -18,12 +17,9 @@ from common.status.codes import Doing
 from feelahead.both_sides.processes import SideProcess
 from robot_side.compiled.machine_code import machine_code_folder
 from tests.helpers.machines.two_machines import Machine
-from tests.helpers.machines.waiting import wait_until
+from tests.helpers.machines.waiting import LIMIT_S, wait_until
 from tests.helpers.repository import ROOT
 
-PATIENCE_S = 60.0
-ATTEMPTS = 3
-MOST_GAP_MS = 1000.0
 NAME = "robot.lan"
 """Host name by which the operator's host finds the robot's"""
 NOBODY = "198.18.0.99"
@@ -70,7 +66,7 @@ class Host:
             text=True,
             check=False,
             cwd=self.home,
-            timeout=PATIENCE_S,
+            timeout=LIMIT_S,
         )
         assert done.returncode in codes, f"{command}: code {done.returncode}: {done.stderr.strip()[-300:]}"
         return done.stdout
@@ -168,7 +164,7 @@ class Lan:
     def end(self, called: str) -> None:
         """End a side as Ctrl-C does; AssertionError unless its exit code is 0."""
         with self._sides.pop(called).process as process:
-            code = process.stop()
+            code = process.stop(LIMIT_S)
         assert code == 0, f"the {called} side ended with code {code}"
 
     def kill(self, called: str) -> None:
@@ -217,7 +213,7 @@ class Lan:
         for side in list(self._sides.values()):
             side.listen()
 
-    def until(self, called: str, what: str, condition: Callable[[Status], bool], limit_s: float = PATIENCE_S) -> Status:
+    def until(self, called: str, what: str, condition: Callable[[Status], bool], limit_s: float = LIMIT_S) -> Status:
         """Return the side's first status from now on for which `condition` holds; AssertionError after `limit_s`."""
         self.listen()
         side = self._sides[called]
@@ -255,7 +251,7 @@ class Lan:
     def back(self) -> None:
         """Wait until the link is up again; assert that the arm is disarmed then; wait until it is armed again."""
         began_s = time.monotonic()
-        status = wait_until("operator: the link is up", self._first_after_the_loss, PATIENCE_S)
+        status = wait_until("operator: the link is up", self._first_after_the_loss, LIMIT_S)
         print(f"back after {time.monotonic() - began_s:.1f} s")
         assert status["state"] == "disarmed"
         fresh = self.until("operator", "armed again", lambda status: is_done(status) or _is_armed_and_shown(status))
@@ -283,17 +279,11 @@ def _is_armed_and_shown(status: Status) -> bool:
     return is_armed(status) and status["target_centre_mm"] is not None
 
 
-def gap_ms(stop: Status) -> float:
-    """Return the milliseconds without a command after which the robot side stopped the arm.
-
-    Fail if the arm stopped for another reason, or only after a second.
-
-    100 ms are promised, and 20 more at worst, but only a quiet machine keeps them.
-    """
-    said = re.fullmatch(r"no command for (\d+) ms", str(stop["stopped_because"]))
-    assert said is not None, stop["stopped_because"]
-    assert float(said[1]) < MOST_GAP_MS
-    return float(said[1])
+def silence(stop: Status) -> str:
+    """Return why the robot side stopped the arm; AssertionError unless it was because nothing came any more."""
+    why = str(stop["stopped_because"])
+    assert why.startswith(("no command for", "nothing heard for longer than")), why
+    return why
 
 
 def is_moving(status: Status) -> bool:

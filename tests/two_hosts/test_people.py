@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.two_hosts.lan import ATTEMPTS, Host, Lan, gap_ms, is_armed
+from tests.helpers.machines.quiet import judged
+from tests.two_hosts.lan import Host, Lan, is_armed, silence
 
 pytestmark = [pytest.mark.two_hosts, pytest.mark.processes]
 
@@ -27,7 +28,7 @@ def test_a_second_operator_watches_until_revoked_and_an_unknown_key_gets_nothing
     lan.until("robot", "an observer", lambda status: status["observers"] == 1)
     lan.until("operator", "armed", is_armed)
     for _ in lan.watch(1.5):
-        assert bobs.status["link"] == "observing"
+        assert bobs.status["link"] != "up"
     lan.robot_host.run("feelahead keys revoke bob")
     began_s = time.monotonic()
     lan.until("bob", "out", lambda status: _REFUSED in str(status["link_reason"]))
@@ -68,7 +69,7 @@ def test_the_robot_side_killed(lan: Lan) -> None:
 def test_the_operator_side_killed(lan: Lan) -> None:
     lan.moving()
     lan.kill("operator")
-    gap_ms(lan.until("robot", "the arm is stopped", lambda status: not is_armed(status)))
+    silence(lan.until("robot", "the arm is stopped", lambda status: not is_armed(status)))
     lan.until("robot", "the lease is free", lambda status: status["owner"] is None)
     lan.start("operator")
     lan.back()
@@ -84,6 +85,7 @@ def test_the_operator_side_first(lan: Lan) -> None:
     lan.back()
 
 
+@pytest.mark.quiet
 def test_a_wall_clock_stepped_by_an_hour_and_back(lan: Lan) -> None:
     """Only both sides' processes see the changed wall clock; the arm must go on moving."""
     libraries = sorted(Path("/usr/lib").glob("*/faketime/libfaketimeMT.so.1"))
@@ -107,20 +109,15 @@ def test_a_wall_clock_stepped_by_an_hour_and_back(lan: Lan) -> None:
         partial.replace(offset)
         return int(under_it(lan.robot_host).run("date +%s"))
 
-    def undisturbed() -> bool:
-        return all(is_armed(lan.robot.status) for _ in lan.watch(1.5))
-
     step(0)
     lan.restart(under_it)
-    for _ in range(ATTEMPTS):
+    try:
         lan.moving()
-        before_s = step(0)
-        assert _AN_HOUR_S <= step(_AN_HOUR_S) - before_s < _AN_HOUR_S + 60
-        forward = undisturbed()
-        why = lan.robot.status["stopped_because"]
-        step(0)
-        if forward and undisturbed():
-            break
-    else:
-        pytest.fail(f"the arm was stopped each time: {why or lan.robot.status['stopped_because']}")
-    lan.restart()
+        with judged():
+            before_s = step(0)
+            assert _AN_HOUR_S <= step(_AN_HOUR_S) - before_s < _AN_HOUR_S + 60
+            for _ in range(2):
+                assert all(is_armed(lan.robot.status) for _ in lan.watch(1.5)), lan.robot.status["stopped_because"]
+                step(0)
+    finally:
+        lan.restart()

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from tests.helpers.machines.quiet import judged
 from tests.helpers.machines.waiting import wait_until
 from tests.helpers.repository import ROOT
-from tests.two_hosts.lan import ATTEMPTS
 from tests.two_hosts.wide_area.running import run_trial
 from tests.two_hosts.wide_area.trial import Trial
 from tests.two_hosts.wide_area.tunnels import what_is_missing
@@ -24,6 +24,7 @@ _QUEUEING_MS = 20.0
 _RESTING_KBIT_S = 200.0
 
 
+@pytest.mark.quiet
 @pytest.mark.parametrize(
     "trial",
     [
@@ -33,19 +34,14 @@ _RESTING_KBIT_S = 200.0
     ],
 )
 def test_armed_without_a_stop_and_without_a_queue(trial: Trial) -> None:
-    """One run in three must succeed: other programs on the machine make messages older, and can stop the arm."""
-    faults = []
-    for _ in range(ATTEMPTS):
+    with judged():
         outcome = run_trial(trial)
         print({name: round(value, 2) if isinstance(value, float) else value for name, value in outcome.items()})
-        # Ages include a busy machine's share; with a rate, the link's own queue is known.
-        kept = outcome["link_queue_p95_ms" if trial.rate else "queueing_p95_ms"] <= _QUEUEING_MS
+        # Ages include a machine's own share; with a rate, the link's own queue is known.
+        assert outcome["link_queue_p95_ms" if trial.rate else "queueing_p95_ms"] <= _QUEUEING_MS
         if trial.loss:
-            kept &= outcome["to_operator_p99_ms"] <= trial.delay + _QUEUEING_MS
-        if kept and (outcome["armed"], outcome["stops"]) == (1.0, 0):
-            return
-        faults.append(outcome)
-    pytest.fail(f"not once in {ATTEMPTS}: {faults}")
+            assert outcome["to_operator_p99_ms"] <= trial.delay + _QUEUEING_MS
+        assert (outcome["armed"], outcome["stops"]) == (1.0, 0)
 
 
 def test_hands_that_rest_take_little_of_a_link() -> None:
@@ -69,4 +65,4 @@ def test_killed_it_leaves_nothing() -> None:
         assert namespace.exists()
         assert namespace.name.startswith("feelahead-wide-robot-")
         opened.kill()
-    wait_until("deleted", lambda: not namespace.exists(), 10.0)
+    wait_until("deleted", lambda: not namespace.exists())

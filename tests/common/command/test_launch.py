@@ -12,7 +12,8 @@ from pathlib import Path
 import pytest
 
 from common.command.stop_signal import StopSignal
-from tests.helpers.python_process import LIMIT_S, ended, start
+from tests.helpers.machines.waiting import LIMIT_S
+from tests.helpers.python_process import ended, start
 from tests.helpers.repository import ROOT
 
 MODULES = ("robot_side", "operator_side", "feelahead")

@@ -16,10 +16,9 @@ from common.recording.entries import Kind, entry, unpack_block
 from common.recording.reading import open_recording
 from common.recording.recorder import FLUSH_PERIOD_S
 from common.recording.side import Recorder, SideRecording
+from tests.helpers.machines.waiting import LIMIT_S
 
 pytestmark = pytest.mark.processes
-
-LIMIT_S = 600.0
 
 
 class Bytes:

@@ -28,8 +28,9 @@ from operator_side.turns import OperatorTurns
 from robot_side.operators.safety import SafetySettings
 from robot_side.turns import KEYS_PERIOD_S, RobotTurns
 from tests.helpers.hostile.raw_zmtp import RawConnection, port_of
+from tests.helpers.machines.waiting import LIMIT_S
 from tests.helpers.machines.waiting import wait_until as wait_for
-from tests.helpers.python_process import LIMIT_S, ended, start
+from tests.helpers.python_process import ended, start
 from tests.helpers.serving_robot import ServingRobot
 from tests.robot_side.viewing.viewer import Viewer
 

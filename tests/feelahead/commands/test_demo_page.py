@@ -20,8 +20,7 @@ from common.status.statuses import OperatorStatus
 from feelahead.both_sides.processes import SideProcess
 from feelahead.commands.demo.page import AFTER_PAGES_S, FIRST_PAGE_S, KeptPage, Lifetime, kept_addresses
 from feelahead.commands.demo.run import Said, Start, take_events
-from tests.helpers.machines.waiting import wait_until
-from tests.helpers.python_process import LIMIT_S
+from tests.helpers.machines.waiting import LIMIT_S, wait_until
 from tests.operator_side.viewing.terminal.on_terminal import OnTerminal
 
 

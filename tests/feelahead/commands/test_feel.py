@@ -25,7 +25,7 @@ from operator_side.dualsense.reports.output_report import parse_output_report
 from operator_side.dualsense.simulated.controller import SIMULATED_ADDRESS
 from tests.feelahead.commands.conftest import Played
 from tests.helpers.fake_hid import ADDRESS
-from tests.helpers.python_process import LIMIT_S
+from tests.helpers.machines.waiting import LIMIT_S
 from tests.helpers.repository import ROOT
 
 pytestmark = pytest.mark.usefixtures("own_folder")

@@ -25,8 +25,7 @@ from feelahead.lab.journal import Journal
 from feelahead.lab.sweep import ask, generator, sweep
 from tests.feelahead.lab import counting
 from tests.feelahead.lab.counting import QUESTION, TIMED, Cell, Counting, held
-from tests.helpers.machines.waiting import wait_until
-from tests.helpers.python_process import LIMIT_S
+from tests.helpers.machines.waiting import LIMIT_S, wait_until
 from tests.helpers.repository import ROOT
 
 _GRID = ("--numbers", "1", "2", "3", "4", "--seeds", "3")

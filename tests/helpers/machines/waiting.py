@@ -4,6 +4,8 @@ import time
 from collections.abc import Callable
 from typing import TypeVar
 
+LIMIT_S = 600.0
+"""Time limit in seconds that a machine of a tenth of the speed keeps, whose processor is taken away for seconds"""
 Value = TypeVar("Value")
 
 _LOOK_S = 0.02
@@ -12,7 +14,7 @@ _LOOK_S = 0.02
 def wait_until(
     what: str,
     condition: Callable[[], Value | None],
-    limit_s: float = 60.0,
+    limit_s: float = LIMIT_S,
     instead: Callable[[], object] | None = None,
 ) -> Value:
     """Return the first value of `condition` that is not None or False.

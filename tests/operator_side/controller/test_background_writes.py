@@ -11,9 +11,9 @@ from operator_side.controller.background_writes import CLOSE_TIMEOUT_S, STALL_S,
 from operator_side.controller.feel import FREE_TRIGGER, RELEASED, Feel, Rumble
 from operator_side.controller.state import ControllerState
 from tests.helpers.felt import feedback
+from tests.helpers.machines.waiting import LIMIT_S
 
 STIFF = Feel(r2=feedback(3, 6))
-LIMIT_S = 600.0
 
 
 class SlowDevice:

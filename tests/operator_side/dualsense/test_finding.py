@@ -12,10 +12,10 @@ from operator_side.dualsense.hid.finding import LOOKS_FOR_THE_SAME, Finder, Sigh
 from operator_side.dualsense.hid.udev import RULES
 from operator_side.dualsense.reports.output_report import build_output_report
 from tests.helpers.fake_hid import ADDRESS, BLUETOOTH, SIMPLE_REPORT, USB, FakeBackend, FakeHandle
+from tests.helpers.machines.waiting import LIMIT_S
 
 A, B = b"/dev/hidraw3", b"/dev/hidraw4"
 OTHER = "11:22:33:44:55:66"
-LIMIT_S = 600.0
 
 
 @pytest.mark.parametrize(("product_id", "model"), [(0x0CE6, "DualSense"), (0x0DF2, "DualSense Edge")])

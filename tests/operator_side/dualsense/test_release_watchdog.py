@@ -14,10 +14,10 @@ import pytest
 import operator_side.dualsense.hid.release_guard
 from operator_side.dualsense.hid.release_guard import MOST_REPLACEMENTS, ReleaseGuard
 from operator_side.dualsense.hid.release_watchdog import SILENCE_S, Target, Watch
+from tests.helpers.machines.waiting import LIMIT_S
 from tests.helpers.repository import ROOT
 
 pytestmark = pytest.mark.processes
-LIMIT_S = 600.0
 REPORT = bytes(range(48))
 
 

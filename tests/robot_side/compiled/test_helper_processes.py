@@ -17,6 +17,7 @@ from robot_side.compiled.helper_processes import KernelQueue, compile_in_helpers
 from robot_side.compiled.kernel import Compiled, imported_kernels
 from robot_side.compiled.sources import code_sizes
 from robot_side.compiled.warm_up import warm_up
+from tests.helpers.machines.waiting import LIMIT_S
 from tests.robot_side.compiled.fresh_kernels import NAMES, fresh_kernels
 
 
@@ -103,7 +104,7 @@ def test_nothing_goes_on_compiling_for_a_process_that_has_gone(tmp_path: Path) -
         process.kill()
     try:
         # The descriptor becomes readable when the helper ends. That takes seconds, less than compiling the kernels.
-        assert select.select([ended], [], [], 30.0)[0]
+        assert select.select([ended], [], [], LIMIT_S)[0]
     finally:
         os.close(ended)
     assert list(tmp_path.iterdir()) == []

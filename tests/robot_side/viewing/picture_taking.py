@@ -27,6 +27,7 @@ from robot_side.viewing.exchange import (
 from robot_side.viewing.pictures import MODULE, saved_model
 from robot_side.viewing.rendering import placed
 from robot_side.viewing.viewpoints import viewpoints
+from tests.helpers.machines.waiting import LIMIT_S
 
 WIDTH, HEIGHT = 320, 240
 Image = npt.NDArray[np.uint8]
@@ -64,7 +65,7 @@ class PictureTaker:
         channel = self._companion.channel
         arrived: list[bytes] = []
         while not arrived and not channel.ended:
-            select.select([channel], [channel] if channel.waiting else [], [], 60.0)
+            select.select([channel], [channel] if channel.waiting else [], [], LIMIT_S)
             arrived = channel.receive()
         assert arrived, "the companion has ended"
         message: Ready | Picture | Refusal = decode_from_companion(arrived[0])

@@ -14,9 +14,8 @@ from common.protocol.messages import Hello, StiffnessUpdate, Watch
 from common.protocol.view_messages import SCENE_TOPIC, VIDEO_TOPIC, AnyViewMessage
 from common.rate.pieces import PIECE, Joining
 from common.sockets.operator import OperatorSockets
+from tests.helpers.machines.waiting import LIMIT_S
 
-LIMIT_S: Final = 600.0
-"""Time limit in seconds, long enough for a busy machine"""
 _WATCH_PERIOD_S: Final = 0.25
 _COMPANION: Final = b"robot_side.viewing.companion"
 _CLOCK: Final = MonotonicClock()

@@ -13,11 +13,11 @@ from typing import Any, Final
 from feelahead.both_sides.processes import SideProcess
 from feelahead.both_sides.summary import read_summary
 from feelahead.lab.table import Row
+from tests.helpers.machines.waiting import LIMIT_S
 from tests.two_hosts.wide_area.forwarder import ADDRESSES
 from tests.two_hosts.wide_area.trial import Trial
 from tests.two_hosts.wide_area.tunnels import Child, Host, WideArea
 
-_STARTS_S: Final = 120.0
 _LOOKS_S: Final = 0.05
 _ENDPOINT: Final = f"{ADDRESSES['robot']}:5555"
 _DEVICES: Final = {"drives": "simulated", "rests": "browser"}
@@ -32,7 +32,7 @@ def run_trial(trial: Trial, seed: int = 0) -> Row:
         sides.start()
         total = sides.watch()
         # The robot side first: the operator side's end would be one more stop.
-        codes = sides.robot.stop(), sides.operator.stop()
+        codes = sides.robot.stop(LIMIT_S), sides.operator.stop(LIMIT_S)
         assert codes == (0, 0), f"the sides ended with codes {codes}"
         robot, operator = (read_summary(folder / f"{host}.json") for host in ("robot", "operator"))
         return sides.row(total, robot, operator)
@@ -59,14 +59,14 @@ class _Sides:
         trial = self.trial
         cameras = () if trial.pictures else ("--no-cameras",)
         self.robot = self._side("robot", "robot", f"--bind=tcp://{_ENDPOINT}", "--insecure", *cameras)
-        self.robot.wait_for("listening", _STARTS_S)
+        self.robot.wait_for("listening", LIMIT_S)
         self.wide.figures()
         self.operator = self._operator("operator", *(["--console"] if trial.pictures else ()))
         # The second operator observes.
         self.observer = self._operator("observer") if trial.observer != "none" else None
         self.page: Child | None = None
         if trial.pictures:
-            address = self.operator.wait_for("console", _STARTS_S)["address"]
+            address = self.operator.wait_for("console", LIMIT_S)["address"]
             self.page = self._child("operator", "page", address)
 
     def _side(self, host: Host, name: str, *arguments: str) -> SideProcess:
@@ -79,7 +79,7 @@ class _Sides:
         connections = (f"--connections={self.trial.connections}",) if self.trial.connections else ()
         device = f"--device={_DEVICES[self.trial.person]}"
         side = self._side("operator", name, f"--connect=tcp://{_ENDPOINT}", device, *connections, *more)
-        side.wait_for("status", _STARTS_S)
+        side.wait_for("status", LIMIT_S)
         return side
 
     def _child(self, host: Host, *words: str) -> Child:

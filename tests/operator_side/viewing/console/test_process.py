@@ -27,11 +27,11 @@ from common.protocol.messages import Header
 from common.protocol.view_messages import VIEW_NAMES, VideoStep
 from operator_side.viewing.console.console import Console
 from operator_side.viewing.console.pages import MOST_PAGES, ROUND_ENDS
+from tests.helpers.machines.waiting import LIMIT_S
 from tests.helpers.repository import ROOT
 from tests.operator_side.console_feed import OBJECTS, Feed
 
 pytestmark = pytest.mark.processes
-LIMIT_S = 600.0
 CLOCK = MonotonicClock()
 
 

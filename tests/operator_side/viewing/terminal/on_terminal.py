@@ -11,7 +11,7 @@ import termios
 import time
 from collections.abc import Callable, Sequence
 
-from tests.helpers.python_process import LIMIT_S
+from tests.helpers.machines.waiting import LIMIT_S
 from tests.helpers.repository import ROOT
 
 ENTERED, LEFT = b"\x1b[?1049h", b"\x1b[?1049l"

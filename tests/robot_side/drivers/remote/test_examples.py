@@ -21,6 +21,7 @@ from robot_side.drivers.remote.driver_session import ArmShape
 from robot_side.drivers.remote.frame_message import FRAME_DECODER, FRAME_VERSION, require_possible
 from robot_side.drivers.remote.messages import decoded
 from robot_side.drivers.remote.objects import RemoteObjects
+from tests.helpers.machines.waiting import LIMIT_S
 from tests.helpers.python_process import start
 from tests.helpers.repository import ROOT
 from tests.helpers.socket_talk import EPHEMERAL, ROUNDS
@@ -115,8 +116,8 @@ def test_the_example_in_cpp_packs_what_the_robot_side_reads(tmp_path: Path) -> N
     )
     program = tmp_path / "example_objects"
     build = ["g++", "-std=c++17", "-Wall", "-Wextra", "-Werror", f"-I{tmp_path}", str(EXAMPLES / "example_objects.cpp")]
-    subprocess.run([*build, "-o", str(program)], check=True, timeout=300)
-    payload = subprocess.run([str(program)], check=True, capture_output=True, timeout=60).stdout
+    subprocess.run([*build, "-o", str(program)], check=True, timeout=LIMIT_S)
+    payload = subprocess.run([str(program)], check=True, capture_output=True, timeout=LIMIT_S).stdout
     frame = decoded(payload, FRAME_DECODER, FRAME_VERSION)
     require_possible(frame)
     assert [(thing.name, thing.half_space, thing.sphere) for thing in frame.objects] == [
