@@ -17,7 +17,7 @@ from robot_side.drivers.mujoco.arm import MujocoArm, stand
 from robot_side.drivers.mujoco.camera import CameraError, MujocoCamera
 from robot_side.drivers.mujoco.checks.cost import cost_findings
 from robot_side.drivers.mujoco.checks.joints import joint_findings
-from robot_side.drivers.mujoco.checks.reach import reach_findings
+from robot_side.drivers.mujoco.checks.reach import reach_findings, target_findings
 from robot_side.drivers.mujoco.checks.site_axis import site_findings
 from robot_side.drivers.mujoco.checks.start_collision import start_collision
 from robot_side.drivers.mujoco.encoders import Encoder
@@ -227,11 +227,7 @@ def _notes(scene: Scene, settings: RobotSettings, travel: GripperTravel | None) 
     notes.append(f"objects: {_roles(scene.roles)}")
     if scene.model.nflex:
         notes.append("the model's flexes (deformable bodies) are not perceived: nothing warns of them")
-    if Role.TARGET not in scene.roles.values():
-        notes.append(
-            "no object is a target, so there is nothing to advance to; to name one: let its name begin with target, or"
-            ' [roles] NAME = "target" in the --config file (feelahead demo: --robot-config)'
-        )
+    notes += target_findings(scene)
     notes += [
         f"{name!r} names several things, such as a body and a geom of the world: they count as one object"
         for name in scene.shared_names[:_NAMED_OBJECTS]

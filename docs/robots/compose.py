@@ -1,9 +1,10 @@
 """Join an arm and a hand, each an MJCF file such as robosuite's, into one model with absolute paths to its meshes.
 
-python docs/robots/compose.py ARM.xml HAND.xml OUT.xml [BODY [ANGLE...]]
+python docs/robots/compose.py ARM.xml HAND.xml OUT.xml [--pin=LINK,LINK,X,Y,Z ...] [BODY [ANGLE...]]
 
 BODY: the arm's body that carries the hand; right_hand unless given. ANGLE: the arm's joints in the keyframe `home`,
-then the hand's, if its parts collide at 0.
+then the hand's, if its parts collide at 0. --pin: joins two links of the hand, at X, Y, Z (m) in the first one's frame,
+in place of their contacts, by which a linkage that is open jams.
 """
 
 import re
@@ -28,8 +29,10 @@ def read(path: Path) -> mujoco.MjSpec:
     return mujoco.MjSpec.from_string(re.sub(r'file="(?=[^/])', f'file="{path.parent.resolve()}/', text))
 
 
-def main(arm_path: str, hand_path: str, out_path: str, carrier: str = "right_hand", *angles: str) -> None:
+def main(arm_path: str, hand_path: str, out_path: str, *more: str) -> None:
     """Write the joined model, with robosuite's contacts, and steps of 1 ms: at 2 ms, linkages without dampers break."""
+    pins = [word for word in more if word.startswith("--pin=")]
+    carrier, *angles = [word for word in more if word not in pins] or ["right_hand"]
     arm, hand = read(Path(arm_path)), read(Path(hand_path))
     if 'angle="' not in Path(hand_path).read_text():
         hand.compiler.degree = arm.compiler.degree
@@ -37,6 +40,13 @@ def main(arm_path: str, hand_path: str, out_path: str, carrier: str = "right_han
     arm.option.timestep, arm.option.integrator = 0.001, mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     # As in robosuite's base.xml, which a robot's own file leaves out.
     arm.option.cone, arm.option.impratio = mujoco.mjtCone.mjCONE_ELLIPTIC, 20.0
+    for pin in pins:
+        one, other, *place = pin.removeprefix("--pin=").split(",")
+        names = f"g_{one}", f"g_{other}"
+        arm.add_exclude(bodyname1=names[0], bodyname2=names[1])
+        joined = arm.add_equality(type=mujoco.mjtEq.mjEQ_CONNECT, objtype=mujoco.mjtObj.mjOBJ_BODY)
+        joined.name1, joined.name2 = names
+        joined.data[:3] = [float(part) for part in place]
     model = arm.compile()
     chain, body = set(), model.body(carrier).id
     while body:

@@ -20,10 +20,16 @@ from feelahead.lab.table import Row, Table
 from feelahead.printing.figures import shown
 from operator_side.people.settings import PersonSettings
 from robot_side.drivers.mujoco.built_in_scenes import SceneName
+from robot_side.drivers.mujoco.checks.joints import joint_findings
+from robot_side.drivers.mujoco.checks.reach import reach_findings, target_findings
+from robot_side.drivers.mujoco.checks.site_axis import site_findings
+from robot_side.drivers.mujoco.checks.start_collision import start_collision
+from robot_side.drivers.mujoco.gripper_measurement import measure_gripper
 from robot_side.drivers.mujoco.robot_model import SiteAxis
+from robot_side.drivers.mujoco.scene import load_scene
 from robot_side.main import TICK_PERIOD_S
 
-_COLUMNS: Final = {
+COLUMNS: Final = {
     "seed": ("seed", 0),
     "grasped": ("grasped", 0),
     "lifted_mm": ("lifted, mm", 0),
@@ -87,18 +93,29 @@ def run(cell: Trial, seed: int) -> Iterator[Row]:
     yield run_trial(cell, seed)
 
 
-def show(_: DemoSettings, table: Table) -> Iterator[Shown]:
-    """Yield a table for each link: a row for each seed, and the number of successes."""
+def show(settings: DemoSettings, table: Table) -> Iterator[Shown | str]:
+    """Yield a table for each link: a row for each seed, and the number of successes; then what the start says."""
     for (link,), runs in table.groups("link"):
-        lines = [[_said(one[name], digits) for name, (_, digits) in _COLUMNS.items()] for one in runs]
+        lines = [[_said(one[name], digits) for name, (_, digits) in COLUMNS.items()] for one in runs]
         total = {name: str(sum(runs.values(name))) for name in ("grasped", "placed", "hits")} | {
             "seed": f"of {len(runs)}",
             "lifted_mm": str(sum(lifted > 50.0 for lifted in runs.values("lifted_mm"))),
             "felt_before_s": str(sum(early > 0.0 for early in runs.values("felt_before_s"))),
             "finished_s": str(len(runs.values("finished_s"))),
         }
-        lines.append([total.get(name, "") for name in _COLUMNS])
-        yield shown(f"link: {link or 'none'}", (heading for heading, _ in _COLUMNS.values()), lines)
+        lines.append([total.get(name, "") for name in COLUMNS])
+        yield shown(f"link: {link or 'none'}", (heading for heading, _ in COLUMNS.values()), lines)
+    if settings.model is not None and not all(table.values("placed")):
+        yield from (f"at the start: {line}" for line in _findings(settings))
+
+
+def _findings(settings: DemoSettings) -> list[str]:
+    """Return what a robot side says at its start of a model that may not suit the task."""
+    axis = settings.site_axis
+    scene = load_scene(settings.model, settings.site, name=settings.scene, seed=settings.seed, site_axis=axis)
+    travel = measure_gripper(scene)
+    found = target_findings(scene) + site_findings(scene, axis, travel) + start_collision(scene)
+    return found + joint_findings(scene, travel) + reach_findings(scene)
 
 
 def _said(value: float | None, digits: int) -> str:

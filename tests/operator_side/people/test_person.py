@@ -303,6 +303,13 @@ def test_an_object_that_is_stopped_from_the_first_is_let_go_at_last() -> None:
     assert 2.5 < desk.until(Doing.LETTING_GO, at_height(UP_AT_M), 5.0) < 4.0
 
 
+def test_they_draw_back_only_as_far_as_the_arm_can() -> None:
+    desk = carried()
+    desk.until(Doing.LETTING_GO, at_height(UP_AT_M), 5.0)
+    desk.until(Doing.DRAWING_BACK, at_height(UP_AT_M + 0.02, holding=False), 5.0)
+    assert 2.0 < desk.until(Doing.DONE, at_height(UP_AT_M + 0.02, 0.4, holding=False), 5.0) < 4.0
+
+
 def test_a_stiff_trigger_beside_the_way_down_does_not_keep_them_from_lowering() -> None:
     # A tool that points slightly up lowers by the stick, and a little by L2.
     up = (0.0, -0.98, 0.2)

@@ -17,7 +17,7 @@ _INSIDE_M: Final = 0.015
 """Distance of the tool from the ends of the fingertips, as in the built-in arm"""
 _AWAY_M: Final = 0.02
 _ASIDE_M: Final = 0.005
-"""Distances up to which a site stays where it is: in all, as a person grasps as far past the tool's point, and across"""
+"""Distances up to which a site stays: in all, as a person grasps as far past the tool's point; and across the hand"""
 BESIDE_M: Final = 0.013
 """Least room between the target and each finger: 3 mm by which the spheres protrude, and 10 mm of the arm's and the
 camera's errors at the usual probability"""
@@ -26,6 +26,8 @@ _NEAR_M: Final = 0.033
 object against it. The built-in target's half width fits, and `BESIDE_M`"""
 _ASKEW_RAD: Final = math.radians(45.0)
 """Angle from its closed position beyond which a jaw that turns pushes an object rather out of the hand than across"""
+_HAND_M: Final = 0.2
+"""Room between two jaws, of which one turns, if there is nothing on one side"""
 _STILL_M: Final = 1e-3
 INTO_M: Final = 0.04
 LOW_INTO_M: Final = 0.01
@@ -105,7 +107,8 @@ def rooms_m(
 
 
 def _between(model: Any, data: Any, robot: RobotModel, travel: GripperTravel) -> tuple[FloatArray, float]:
-    """Return the way (3,), in the world, from the site to midway between the fingers, inside their ends; its part across.
+    """Return the way (3,), in the world, from the site to midway between the fingers, inside their ends; and how much
+    of it is across the hand, in m.
 
     If only one jaw moves, the way ends near the other one instead.
     The ends are those of the open fingers, or of the closed ones if these reach farther. `data` is left open.
@@ -123,7 +126,7 @@ def _between(model: Any, data: Any, robot: RobotModel, travel: GripperTravel) ->
     across_m = float((ends.reshape(2, 3).mean(axis=0) - site_m) @ closing)
     middle_m = across_m * closing + (max(ends_m) - _INSIDE_M) * approach
     still = still_side(model, data, robot, travel, closing)
-    reach_m = (0.5 * apart_m, INTO_M) if still == 0.0 else (apart_m, LOW_INTO_M)
+    reach_m = (0.5 * apart_m, INTO_M) if still == 0.0 else (_HAND_M, LOW_INTO_M)
     rooms = rooms_m(model, data, robot, site_m + middle_m, closing, *reach_m)
     if still == 0.0:
         aside_m = 0.5 * (rooms[1] - rooms[0])

@@ -3,10 +3,11 @@
 import math
 from typing import Any, Final
 
+import mujoco  # type: ignore[import-untyped]
 import numpy as np
 
 from common.roles import Role
-from robot_side.drivers.mujoco.gripper_measurement import GripperTravel
+from robot_side.drivers.mujoco.gripper_measurement import GripperTravel, jaw_pairs
 from robot_side.drivers.mujoco.model_enums import JointKind
 from robot_side.drivers.mujoco.robot_model import moves_any
 from robot_side.drivers.mujoco.scene import Scene
@@ -16,6 +17,8 @@ _SAME: Final = 0.02
 _OUTSIDE: Final = 1e-3
 """Least distance from a range, in rad or m, at which a joint starts outside it"""
 _NAMED: Final = 4
+_FILLS_M: Final = 0.01
+"""Depth of a hand's part inside another one from which there may be no gap between them"""
 
 
 def joint_findings(scene: Scene, travel: GripperTravel | None) -> list[str]:
@@ -64,6 +67,7 @@ def _grip(scene: Scene, travel: GripperTravel | None) -> list[str]:
         why = "no actuator opens and closes fingers beyond the arm's last joint"
         if scene.robot.gripper_actuators.size:
             why = "the hand's actuators do not bring its fingers together over the whole of their ctrlrange"
+            why += _filled(scene)
         return [f"{why}: nothing can be grasped"]
     targets = [thing for thing in scene.objects if scene.roles[thing.name] is Role.TARGET]
     opening_m, closed_m = float(travel.openings_m[0]), float(travel.openings_m[-1])
@@ -80,6 +84,22 @@ def _grip(scene: Scene, travel: GripperTravel | None) -> list[str]:
                 f" {thing.name!r}, which is {1e3 * thick_m:.0f} mm thick"
             ]
     return []
+
+
+def _filled(scene: Scene) -> str:
+    """Return how deep the hand's parts are inside each other at the start, if that leaves no gap: meshes are convex."""
+    model, robot = scene.model, scene.robot
+    deepest_m, one, other = 0.0, 0, 0
+    for a, b in jaw_pairs(robot.gripper_geoms, model.geom_bodyid[robot.gripper_geoms], robot.geom_on_finger):
+        if (apart_m := mujoco.mj_geomDistance(model, scene.data, a, b, 1.0, None)) < deepest_m:
+            deepest_m, one, other = apart_m, a, b
+    if deepest_m > -_FILLS_M:
+        return ""
+    first, second = (model.geom(geom).name or f"geom{geom}" for geom in (one, other))
+    return (
+        f" ({first!r} is {-1e3 * deepest_m:.0f} mm inside {second!r}: for contacts MuJoCo takes the convex hull of a"
+        " mesh, which fills what is hollow)"
+    )
 
 
 def _driven(model: Any, joint: int) -> bool:

@@ -1,4 +1,4 @@
-"""Check of a model's reach: the target, and the places to which it is carried."""
+"""Checks of a model's target: that there is one, and that the tool reaches it and the places to which it is carried."""
 
 import math
 from typing import Final
@@ -16,6 +16,16 @@ _PLACES: Final = (
     "where it is put down",
 )
 _TURNED_DEG: Final = 20.0
+
+
+def target_findings(scene: Scene) -> list[str]:
+    """Return a line if no object is a target."""
+    if Role.TARGET in scene.roles.values():
+        return []
+    return [
+        "no object is a target, so there is nothing to advance to; to name one: let its name begin with target, or"
+        ' [roles] NAME = "target" in the --config file (feelahead demo: --robot-config)'
+    ]
 
 
 def reach_findings(scene: Scene) -> list[str]:

@@ -11,8 +11,10 @@ from robot_side.drivers.mujoco.brought.table import fit_target
 from robot_side.drivers.mujoco.checks.cost import cost_findings
 from robot_side.drivers.mujoco.checks.joints import joint_findings
 from robot_side.drivers.mujoco.checks.reach import reach_findings
+from robot_side.drivers.mujoco.checks.site_axis import site_findings
 from robot_side.drivers.mujoco.encoders import Encoder
 from robot_side.drivers.mujoco.gripper_measurement import measure_gripper
+from robot_side.drivers.mujoco.robot_model import SiteAxis
 from robot_side.drivers.mujoco.scene import Scene, load_scene
 from tests.helpers.arm_models import TENDON_GRIPPER, planar_arm
 
@@ -80,6 +82,41 @@ def test_where_only_one_jaw_moves_the_tool_is_near_the_other_one_and_the_target_
     assert scene.model.geom("table_scene/target").size[2] == pytest.approx(0.03)
 
 
+def turning_jaw(folder: Path) -> Path:
+    """Write the built-in arm with one jaw that turns by a quarter, about a hinge 50 mm behind its tip."""
+    return brought(
+        folder,
+        ('name="left_finger" axis="0 1 0"', 'name="left_finger" type="hinge" pos="0 0 0.03" axis="-1 0 0"'),
+        ('<geom name="left_finger" pos="0 0.007 0.02" size="0.011 0.007 0.02" mass="0.04"/>', ""),
+        ('<joint name="right_finger" axis="0 -1 0"/>', ""),
+        ('<joint joint="right_finger" coef="1"/>', ""),
+        ('<joint joint1="left_finger" joint2="right_finger" solimp="0.95 0.99 0.001" solref="0.005 1"/>', ""),
+        ('range="0 0.0425"', 'range="0 1.5708"'),
+        ('kp="2000" kv="40" forcerange="-40 40" ctrlrange="0 0.085"', 'kp="20" kv="1" ctrlrange="0 1.5708"'),
+        (" 0.0425 0.0425", " 1.5708"),
+        (" 0.085", " 1.5708"),
+    )
+
+
+def test_a_jaw_that_turns_pushes_the_target_across_and_does_not_overturn_it(tmp_path: Path) -> None:
+    scene = load_scene(turning_jaw(tmp_path), "tool")
+    still = scene.data.geom("right_fingertip")
+    away_m = still.xmat.reshape(3, 3)[:, 1] @ (scene.data.site_xpos[scene.robot.site] - still.xpos)
+    # 25 mm from the still jaw's face, 10 mm behind the tool's point, is the jaw's face when it has 45 degrees left.
+    near_m = away_m - 0.006
+    assert near_m == pytest.approx(0.5 * (0.025 + 0.013), abs=1e-3)
+    # On the table the target slides rather than tips over.
+    [friction] = scene.model.pair_friction
+    assert friction[0] == pytest.approx(0.3)
+
+
+@pytest.mark.parametrize("axis", ["x", "-z"])
+def test_a_wrong_axis_is_named_of_a_hand_with_one_turning_jaw(axis: SiteAxis, tmp_path: Path) -> None:
+    scene = load_scene(turning_jaw(tmp_path), "tool", site_axis=axis)
+    [line] = site_findings(scene, axis, measure_gripper(scene))
+    assert "--site-axis z fits" in line
+
+
 @pytest.mark.parametrize(("own", "kept"), [('cone="elliptic" impratio="10"', 10.0), ("", 30.0)])
 def test_only_a_model_that_chooses_no_contacts_gets_others_at_the_table(tmp_path: Path, own: str, kept: float) -> None:
     scene = load_scene(brought(tmp_path, ('cone="elliptic" impratio="10"', own)), "tool")
@@ -141,6 +178,8 @@ def test_a_hand_without_driven_fingers_is_said(tmp_path: Path) -> None:
     assert any("no actuator opens and closes" in line for line in joint_lines(load_scene(bare, "tcp")))
     idle = planar_arm(tmp_path, gripper_actuators=TENDON_GRIPPER.replace("0 255", "0 0.1"))
     assert any("the hand's actuators do not bring" in line for line in joint_lines(load_scene(idle, "tcp")))
+    idle.write_text(idle.read_text().replace('size="0.02 0.06 0.02"', 'size="0.02 0.06 0.09"'))
+    assert any("_tip' is" in line and "inside 'palm'" in line for line in joint_lines(load_scene(idle, "tcp")))
 
 
 def test_fingers_that_do_not_close_on_the_target_are_said(tmp_path: Path) -> None:
