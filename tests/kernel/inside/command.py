@@ -12,10 +12,9 @@ from operator_side.dualsense.reports.transport import Transport
 from operator_side.dualsense.simulated.controller import SIMULATED_ADDRESS
 from operator_side.dualsense.uhid.controller import UhidIdentity
 from tests.helpers.felt import feedback
-from tests.helpers.machines.waiting import wait_until
+from tests.helpers.machines.waiting import LIMIT_S, wait_until
 from tests.kernel.inside.kernel_view import ABS_RZ, ABS_X, InputDevice, seen_device
 
-_START_S = 60.0
 # Not all of `feelahead`: an emulated processor would take long to load the other commands.
 _COMMAND = (
     "import sys; from feelahead.commands.virtual_dualsense import virtual_dualsense as v; sys.exit(v(sys.argv[1:]))"
@@ -33,7 +32,7 @@ def test_the_driver_takes_it_its_hands_move_and_it_says_what_it_is_told(tmp_path
 
     with said.open("w") as output, subprocess.Popen(command, stdout=output, stderr=output) as process:
         try:
-            wait_until("a driver takes it", lambda: "a driver has taken it" in lines(), _START_S, instead=lines)
+            wait_until("a driver takes it", lambda: "a driver has taken it" in lines(), instead=lines)
             view = wait_until("the kernel shows it", lambda: seen_device(commanded))
             wait_until("three input devices", lambda: len(view.inputs()) == 3)
             with InputDevice(view.inputs()[commanded.name]) as device:
@@ -45,7 +44,7 @@ def test_the_driver_takes_it_its_hands_move_and_it_says_what_it_is_told(tmp_path
             told_it = "R2: strengths 0 0 0 6 6 6 6 6 6 6"
             wait_until("it says the effect", lambda: told_it in lines(), instead=lines)
             process.send_signal(signal.SIGTERM)
-            assert process.wait(30.0) == 0
+            assert process.wait(LIMIT_S) == 0
             assert lines()[-1].startswith("unplugged: ")
             wait_until("it is gone", lambda: seen_device(commanded) is None)
         finally:

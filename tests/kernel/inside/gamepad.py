@@ -121,7 +121,7 @@ def test_an_operator_side_drives_by_it_and_leaves_no_motor_on(plugged: Plugged, 
         SideProcess("operator_side", "operator", ["--device=evdev", *robot.flags]) as operator,
     ):
         desk = Desk(plugged, operator, robot)
-        desk.note("rumble in place of stiffness", 400.0)
+        desk.note("rumble in place of stiffness")
         arm_and_move(desk)
         wait_until("R2 shakes the weak motor", lambda: rumble(plugged).right > 0.5 and rumble(plugged).left == 0.0)
         os.kill(operator.process_id, ends)

@@ -11,13 +11,10 @@ from feelahead.both_sides.processes import SideProcess
 from operator_side.controller.state import Button
 from operator_side.dualsense.reports.transport import Transport
 from operator_side.dualsense.simulated.trigger_model import NORMAL_FINGER_FORCE_N
-from tests.helpers.machines.waiting import stays, wait_until
+from tests.helpers.machines.waiting import LIMIT_S, stays, wait_until
 from tests.kernel.inside.armless_robot import ArmlessRobot
 from tests.kernel.inside.plugged import Plugged, Variant
 
-_PATIENCE_S = 90.0
-_START_PATIENCE_S = 400.0
-"""Time limit of a start in seconds: imports take half a minute on an emulated processor, more on a busy machine"""
 _HEALTHY_S = 0.7
 """Seconds for which commands are sent before arming: longer than the robot side demands"""
 _PRESSED_S = 0.3
@@ -35,14 +32,14 @@ class Desk:
         self.notes: list[str] = []
         self.controller = "unknown"
 
-    def note(self, part: str, patience_s: float = _PATIENCE_S) -> None:
+    def note(self, part: str) -> None:
         """Wait until the operator side has printed a note that contains `part`."""
 
         def said() -> bool:
             self._listen()
             return any(part in note for note in self.notes)
 
-        wait_until(f"a note: {part}", said, patience_s, instead=lambda: self.notes)
+        wait_until(f"a note: {part}", said, instead=lambda: self.notes)
 
     def controller_lost(self) -> bool:
         """Return whether the operator side's newest status reports a lost controller."""
@@ -101,16 +98,16 @@ def arm_and_move(desk: Desk) -> None:
         time.sleep(_PRESSED_S)
         return robot.moving
 
-    wait_until("the arm would move", moving, _PATIENCE_S, instead=lambda: robot.state)
+    wait_until("the arm would move", moving, instead=lambda: robot.state)
 
 
 def test_without_a_controller_it_says_so_and_commands_nothing(desk: Desk) -> None:
     plugged, robot = desk.plugged, desk.robot
-    desk.note("no DualSense", _START_PATIENCE_S)
+    desk.note("no DualSense")
     assert "waiting for a controller" in desk.notes[0]
     assert robot.commands == 0
     plugged.plug_in()
-    wait_until("commands come", lambda: robot.commands > 10, _PATIENCE_S, instead=lambda: desk.notes)
+    wait_until("commands come", lambda: robot.commands > 10, instead=lambda: desk.notes)
     desk.note(f"controller: {plugged.variant.name}")
     assert robot.state == "disarmed"
 
@@ -132,7 +129,7 @@ def test_gone_in_mid_run_the_robot_stops_and_stays_disarmed(desk: Desk, dongle: 
     # The hands still pull R2 and hold L1.
     plugged.offered.off = False
     plugged.plug_in()
-    wait_until("commands come again", lambda: robot.commands > commands + 10, _PATIENCE_S)
+    wait_until("commands come again", lambda: robot.commands > commands + 10)
     desk.note("back again")
     wait_until("its triggers are free", lambda: plugged.ask(lambda controller: controller.released))
     stays("the robot moves again by itself", lambda: robot.state == "disarmed" and not robot.moving)
@@ -150,7 +147,7 @@ def test_stopped_with_stiff_triggers_its_watchdog_releases_them(desk: Desk) -> N
 def test_killed_with_stiff_triggers_its_watchdog_releases_them(desk: Desk) -> None:
     arm_and_pull(desk)
     os.kill(desk.operator.process_id, signal.SIGKILL)
-    assert desk.operator.wait(30.0) == -signal.SIGKILL
+    assert desk.operator.wait(LIMIT_S) == -signal.SIGKILL
     released_and_stopped(desk)
 
 
