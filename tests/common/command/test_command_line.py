@@ -1,4 +1,3 @@
-import os
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated
@@ -8,7 +7,6 @@ from msgspec import Meta
 
 from common.command.command_line import load_toml, parse_settings
 from common.command.run_options import RunOptions
-from common.errors import ConfigurationError
 from common.limits import check_limits
 from tests.helpers.python_process import ended
 from tests.helpers.refusal import refusal
@@ -104,20 +102,6 @@ def test_bad_files_become_one_line_that_names_file_and_key(tmp_path: Path, conte
     assert "bad.toml" in text
     assert "sys." not in text
     assert len(text) < 1000
-
-
-def test_a_pipe_is_refused_without_waiting_for_its_writer(tmp_path: Path) -> None:
-    path = tmp_path / "pipe.toml"
-    os.mkfifo(path)
-    with pytest.raises(ConfigurationError, match=r"pipe\.toml: is no regular file"):
-        parse("--config", str(path))
-
-
-def test_help_is_no_error(capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit) as stop:
-        parse("--help")
-    assert stop.value.code == 0
-    assert "--probability" in capsys.readouterr().out
 
 
 @pytest.mark.processes

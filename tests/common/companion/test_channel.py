@@ -1,4 +1,6 @@
+import contextlib
 import socket
+from collections.abc import Iterator
 
 from hypothesis import given
 from hypothesis import strategies as st
@@ -6,9 +8,11 @@ from hypothesis import strategies as st
 from common.companion.channel import MESSAGE_LIMIT_BYTES, Channel
 
 
-def pair(room_bytes: int = 1 << 23) -> tuple[Channel, Channel]:
-    one, other = socket.socketpair()
-    return Channel(one, room_bytes), Channel(other, room_bytes)
+@contextlib.contextmanager
+def pair(room_bytes: int = 1 << 23) -> Iterator[tuple[Channel, Channel]]:
+    one, other = (Channel(end, room_bytes) for end in socket.socketpair())
+    with contextlib.closing(one), contextlib.closing(other):
+        yield one, other
 
 
 def everything(channel: Channel, sender: Channel) -> list[bytes]:
@@ -24,51 +28,36 @@ def everything(channel: Channel, sender: Channel) -> list[bytes]:
 
 @given(st.lists(st.binary(max_size=3000), max_size=30))
 def test_messages_arrive_whole_and_in_order(messages: list[bytes]) -> None:
-    one, other = pair()
-    assert all(one.send(message[:7], message[7:]) for message in messages)
-    assert everything(other, one) == messages
-    one.close()
-    other.close()
-
-
-def test_large_messages_leave_in_parts() -> None:
-    one, other = pair()
-    large = bytes(range(256)) * 20_000
-    assert one.send(large)
-    assert one.waiting > 0
-    assert everything(other, one) == [large]
-    one.close()
-    other.close()
+    with pair() as (one, other):
+        assert all(one.send(message[:7], message[7:]) for message in messages)
+        assert everything(other, one) == messages
 
 
 def test_what_finds_no_room_is_refused_whole() -> None:
-    one, other = pair(room_bytes=1_000_000)
-    sent = [one.send(bytes([number]) * 300_000) for number in range(20)]
-    assert not all(sent)
-    assert [message[0] for message in everything(other, one)] == [n for n, left in enumerate(sent) if left]
-    one.close()
-    other.close()
+    with pair(room_bytes=1_000_000) as (one, other):
+        sent = [one.send(bytes([number]) * 300_000) for number in range(20)]
+        assert not all(sent)
+        assert [message[0] for message in everything(other, one)] == [n for n, left in enumerate(sent) if left]
 
 
-def test_one_message_may_be_larger_than_the_room() -> None:
-    one, other = pair(room_bytes=10)
-    assert one.send(bytes(1_000_000))
-    assert not one.send(b"next")
-    assert len(everything(other, one)) == 1
-    one.close()
-    other.close()
+def test_one_message_may_be_larger_than_the_room_and_leaves_in_parts() -> None:
+    large = bytes(range(256)) * 20_000
+    with pair(room_bytes=10) as (one, other):
+        assert one.send(large)
+        assert one.waiting > 0
+        assert not one.send(b"next")
+        assert everything(other, one) == [large]
 
 
 def test_the_end_of_one_is_noticed_by_the_other() -> None:
-    one, other = pair()
-    assert one.send(b"last")
-    one.close()
-    assert other.receive() == [b"last"]
-    assert other.receive() == []
-    assert other.ended
-    assert not other.send(b"into the void")
-    assert not one.send(b"from beyond")
-    other.close()
+    with pair() as (one, other):
+        assert one.send(b"last")
+        one.close()
+        assert other.receive() == [b"last"]
+        assert other.receive() == []
+        assert other.ended
+        assert not other.send(b"into the void")
+        assert not one.send(b"from beyond")
 
 
 def test_what_was_sent_before_an_end_arrives_even_if_an_answer_finds_it_closed_first() -> None:
@@ -86,10 +75,8 @@ def test_what_was_sent_before_an_end_arrives_even_if_an_answer_finds_it_closed_f
 
 
 def test_a_length_beyond_reason_ends_it() -> None:
-    one, other = socket.socketpair()
-    channel = Channel(other)
-    one.sendall((MESSAGE_LIMIT_BYTES + 1).to_bytes(4, "little"))
-    assert channel.receive() == []
-    assert channel.ended
-    one.close()
-    channel.close()
+    one, end = socket.socketpair()
+    with one, contextlib.closing(Channel(end)) as channel:
+        one.sendall((MESSAGE_LIMIT_BYTES + 1).to_bytes(4, "little"))
+        assert channel.receive() == []
+        assert channel.ended

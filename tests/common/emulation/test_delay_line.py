@@ -1,6 +1,7 @@
 import math
 import re
 import statistics
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -100,13 +101,21 @@ def test_reports_what_was_asked_and_achieved() -> None:
     assert list(link_summary("to_robot", {"haptics": line, "video": line})) == ["to_robot", "to_robot.video"]
 
 
-@pytest.mark.parametrize("now_s", [math.nan, math.inf])
-def test_refuses_times_that_are_none(now_s: float) -> None:
-    line: DelayLine[int] = DelayLine(LinkProfile())
-    with pytest.raises(ValueError, match="now_s = "):
-        line.push(now_s, 1)
-    with pytest.raises(ValueError, match="now_s = "):
-        line.pop(now_s)
+@pytest.mark.parametrize(
+    ("spec", "call", "said"),
+    [
+        *(("", lambda line, now_s=now_s: line.push(now_s, 1), "now_s = ") for now_s in (math.nan, math.inf)),
+        *(("", lambda line, now_s=now_s: line.pop(now_s), "now_s = ") for now_s in (math.nan, math.inf)),
+        ("corrupt 1%", lambda line: line.push(0.0, 1), "item is not bytes"),
+        ("rate 1mbit", lambda line: line.push(0.0, 1), "size_bytes is missing"),
+        ("rate 1mbit", lambda line: line.push(0.0, 1, -1), "size_bytes = -1"),
+    ],
+)
+def test_refuses_what_cannot_be_sent(spec: str, call: Callable[[DelayLine[int]], object], said: str) -> None:
+    line: DelayLine[int] = DelayLine(LinkProfile.parse(spec))
+    with pytest.raises(ValueError, match=said):
+        call(line)
+    assert line.figures.sent == 0
     assert line.next_due() is None
 
 

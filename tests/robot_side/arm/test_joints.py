@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -107,19 +108,6 @@ def test_limits_hold_and_keep_the_direction(twist: FloatArray, limits: FloatArra
     else:
         np.testing.assert_array_equal(limited, free)
 
-
-@pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
-def test_values_that_are_not_finite_are_refused(bad: float) -> None:
-    jacobian, twist = np.eye(6), np.zeros(6)
-    with pytest.raises(ValueError, match="jacobian"):
-        joint_velocities(np.where(np.eye(6) > 0.0, bad, 0.0), twist, FREE)
-    with pytest.raises(ValueError, match="twist"):
-        joint_velocities(jacobian, np.full(6, bad), FREE)
-    for limit in (0.0, -1.0, math.nan):
-        with pytest.raises(ValueError, match="velocity_limits_rad_s"):
-            joint_velocities(jacobian, twist, np.full(6, limit))
-    with pytest.raises(ValueError, match="too large"):
-        joint_velocities(1e200 * jacobian_with(np.linspace(0.2, 2.0, 6), 1, 6), np.ones(6), FREE)
 
 
 @pytest.mark.parametrize("joints", [5, 6, 7])
@@ -259,17 +247,27 @@ def test_a_hindrance_is_told_once_and_in_words() -> None:
     assert (hindrance.text, hindrance.undone) == (None, 0.0)
 
 
-@pytest.mark.parametrize("bad", [math.nan, math.inf])
-def test_a_pose_that_is_not_finite_moves_nothing(bad: float) -> None:
-    for row in range(3):
-        rotation = np.eye(3)
-        rotation[1, row] = bad
-        with pytest.raises(ValueError, match="tool_rotation"):
-            commanded(command(), pose_with(np.eye(6), rotation), np.zeros(6), LIMITS, SETTINGS)
-    with pytest.raises(ValueError, match="jacobian"):
-        commanded(command(), pose_with(np.full((6, 6), bad), np.eye(3)), np.zeros(6), LIMITS, SETTINGS)
+def rates(jacobian: FloatArray, twist: float = 0.0, limit: float = math.inf) -> Callable[[], object]:
+    return lambda: joint_velocities(jacobian, np.full(6, twist), np.full(6, limit))
 
 
-def test_positions_of_other_joints_are_refused() -> None:
-    with pytest.raises(ValueError, match=r"joint_positions_rad has the shape \(5,\)"):
-        commanded(command(), pose_with(np.eye(6), np.eye(3)), np.zeros(5), LIMITS, SETTINGS)
+def motors(jacobian: FloatArray, rotation: FloatArray, joints: int = 6) -> Callable[[], object]:
+    return lambda: commanded(command(), pose_with(jacobian, rotation), np.zeros(joints), LIMITS, SETTINGS)
+
+
+SIX, THREE = np.eye(6), np.eye(3)
+REFUSED: list[tuple[Callable[[], object], str]] = [
+    *((rates(np.where(SIX > 0.0, bad, 0.0)), "jacobian") for bad in (math.nan, math.inf, -math.inf)),
+    *((rates(SIX, twist=bad), "twist") for bad in (math.nan, math.inf, -math.inf)),
+    *((rates(SIX, limit=limit), "velocity_limits_rad_s") for limit in (0.0, -1.0, math.nan)),
+    (rates(1e200 * jacobian_with(np.linspace(0.2, 2.0, 6), 1, 6), twist=1.0), "too large"),
+    *((motors(SIX, np.where(np.arange(9).reshape(3, 3) == 3 + k, math.nan, THREE)), "tool_rotation") for k in range(3)),
+    *((motors(np.full((6, 6), bad), THREE), "jacobian") for bad in (math.nan, math.inf)),
+    (motors(SIX, THREE, joints=5), r"joint_positions_rad has the shape \(5,\)"),
+]
+
+
+@pytest.mark.parametrize(("call", "said"), REFUSED)
+def test_what_is_not_finite_or_does_not_fit_is_named(call: Callable[[], object], said: str) -> None:
+    with pytest.raises(ValueError, match=said):
+        call()

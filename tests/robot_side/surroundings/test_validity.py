@@ -1,3 +1,5 @@
+"""Perceived objects that a kernel could misread are refused, by the name of the array."""
+
 import dataclasses
 import math
 from collections.abc import Callable
@@ -6,26 +8,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from robot_side.surroundings.perceived import PerceivedObjects
 from robot_side.surroundings.validity import require_valid
 from tests.helpers.perceived_scenes import Scene, random_scene
 
-_NUMBERS = [
-    "sphere_centers_m",
-    "sphere_radii_m",
-    "box_centers_m",
-    "box_rotations",
-    "box_half_sizes_m",
-    "tetrahedron_vertices_m",
-    "half_space_normals",
-    "half_space_offsets_m",
-]
-_INDICES = ["sphere_object", "box_object", "tetrahedron_object", "half_space_object"]
-
-
-def _changed(field: str, change: Callable[[Any], Any]) -> PerceivedObjects:
-    objects = random_scene(np.random.default_rng(0), 3)
-    return dataclasses.replace(objects, **{field: change(getattr(objects, field))})
+NUMBERS = (
+    *("sphere_centers_m", "sphere_radii_m", "box_centers_m", "box_rotations", "box_half_sizes_m"),
+    *("tetrahedron_vertices_m", "half_space_normals", "half_space_offsets_m", "mesh_positions_m", "mesh_rotations"),
+)
+INDICES = ("sphere_object", "box_object", "tetrahedron_object", "half_space_object", "mesh_object")
+Change = Callable[[Any], Any]
 
 
 @pytest.mark.parametrize("of_each_kind", [0, 1, 20])
@@ -34,68 +25,38 @@ def test_what_can_be_is_accepted(of_each_kind: int) -> None:
     require_valid(Scene().add().sphere([1.0, 2.0, 3.0], 0.0).box([0.0, 0.0, 0.0], [0.0, 1.0, 1.0]).objects())
 
 
-@pytest.mark.parametrize("field", _NUMBERS)
-@pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
-def test_each_number_must_be_finite(field: str, bad: float) -> None:
-    def spoil(values: Any) -> Any:
-        values = values.copy()
-        values.reshape(-1)[-1] = bad
-        return values
-
-    with pytest.raises(ValueError, match=f"objects.{field}"):
-        require_valid(_changed(field, spoil))
+def with_at(place: int, bad: float) -> Change:
+    """Return a change that replaces one number of an array by `bad`."""
+    return lambda values: np.where(np.arange(values.size) == place % values.size, bad, values.ravel()).reshape(
+        values.shape
+    )
 
 
-@pytest.mark.parametrize(
-    ("field", "factor", "said"),
-    [
-        ("sphere_radii_m", -1.0, "negative"),
-        ("box_half_sizes_m", -1.0, "negative"),
-        ("box_rotations", 1.0 + 1e-6, "off unit length"),
-        ("half_space_normals", 1.0 + 1e-6, "off unit length"),
-    ],
-)
-def test_sizes_are_positive_and_directions_unit(field: str, factor: float, said: str) -> None:
-    with pytest.raises(ValueError, match=f"objects.{field} .*{said}"):
-        require_valid(_changed(field, lambda values: factor * values))
+SHEAR = np.eye(3) + 1e-5 * np.eye(3, k=1)
+UNREADABLE: dict[str, Change] = {
+    "not contiguous": lambda values: np.repeat(values, 2, axis=0)[::2],
+    "another type": lambda values: values.astype(np.float32),
+    "another shape": lambda values: values[..., None],
+}
+REFUSED: list[tuple[str, Change, str]] = [
+    *((field, with_at(-1, bad), "") for field in NUMBERS for bad in (math.nan, math.inf, -math.inf)),
+    *((field, change, " holds") for field in (*NUMBERS, *INDICES) for change in UNREADABLE.values()),
+    # A kernel would read past the end.
+    *((field, lambda values: values[:-1], " holds .* in the shape") for field in NUMBERS),
+    # A primitive without an object would not get into the scene's table, and so would not be felt.
+    *((owner, with_at(1, bad), " holds .*valid: 0 to") for owner in INDICES for bad in (-1, 99)),
+    *((sizes, lambda values: -values, " .*negative") for sizes in ("sphere_radii_m", "box_half_sizes_m")),
+    *(
+        (axes, lambda values: 1.000001 * values, " .*off unit length")
+        for axes in ("box_rotations", "half_space_normals")
+    ),
+    ("box_rotations", lambda values: values @ SHEAR, " .* right angle"),
+    ("roles", lambda _: (), " holds 0 roles; valid: one for each"),
+]
 
 
-def test_axes_at_other_than_right_angles_are_named() -> None:
-    shear = np.eye(3)
-    shear[0, 1] = 1e-5
-    with pytest.raises(ValueError, match=r"objects\.box_rotations .* right angle"):
-        require_valid(_changed("box_rotations", lambda values: values @ shear))
-
-
-@pytest.mark.parametrize("field", [*_NUMBERS, *_INDICES])
-@pytest.mark.parametrize(
-    "change",
-    [
-        lambda values: np.repeat(values, 2, axis=0)[::2],
-        lambda values: values.astype(np.float32),
-        lambda values: values[..., None],
-    ],
-    ids=["not contiguous", "another type", "another shape"],
-)
-def test_an_array_that_a_kernel_cannot_read_is_named(field: str, change: Callable[[Any], Any]) -> None:
-    with pytest.raises(ValueError, match=f"objects.{field} holds"):
-        require_valid(_changed(field, change))
-
-
-@pytest.mark.parametrize("field", _NUMBERS)
-def test_a_missing_row_is_found_before_a_kernel_reads_past_the_end(field: str) -> None:
-    with pytest.raises(ValueError, match=f"objects.{field} holds .* in the shape"):
-        require_valid(_changed(field, lambda values: values[:-1]))
-
-
-@pytest.mark.parametrize("owner", _INDICES)
-@pytest.mark.parametrize("bad", [-1, 99])
-def test_each_primitive_belongs_to_an_object_that_is_there(owner: str, bad: int) -> None:
-    """A primitive without an object would not get into the scene's table, and so would not be felt."""
-    with pytest.raises(ValueError, match=rf"objects\.{owner} holds .*valid: 0 to"):
-        require_valid(_changed(owner, lambda owners: np.where(np.arange(len(owners)) == 1, bad, owners)))
-
-
-def test_each_object_has_a_role() -> None:
-    with pytest.raises(ValueError, match=r"objects\.roles holds 0 roles; valid: one for each"):
-        require_valid(_changed("roles", lambda _: ()))
+@pytest.mark.parametrize(("field", "change", "said"), REFUSED)
+def test_what_cannot_be_is_named(field: str, change: Change, said: str) -> None:
+    objects = random_scene(np.random.default_rng(0), 3, meshes=2)
+    with pytest.raises(ValueError, match=rf"objects\.{field}{said}"):
+        require_valid(dataclasses.replace(objects, **{field: change(getattr(objects, field))}))
