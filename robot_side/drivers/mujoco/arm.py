@@ -12,7 +12,7 @@ from common.errors import FeelaheadError
 from robot_side.arm.port import ArmState
 from robot_side.drivers.mujoco.encoders import Encoder
 from robot_side.drivers.mujoco.gripper_drive import GRIPPER, GRIPPER_INPUT, GripperDrive
-from robot_side.drivers.mujoco.gripper_measurement import GripperTravel, measure_gripper
+from robot_side.drivers.mujoco.gripper_measurement import STROKE_TIME_S, GripperTravel, measure_gripper
 from robot_side.drivers.mujoco.joint_drives import hold_idle
 from robot_side.drivers.mujoco.joint_reference import JointReference, MotionLimits
 from robot_side.drivers.mujoco.plant import LIMITS, PLANT, Plant, drive, inertia_table, sense
@@ -58,7 +58,7 @@ class MujocoArm:
         scene: Scene,
         encoder: Encoder,
         limits: MotionLimits | None = None,
-        gripper_stroke_time_s: float = 0.6,
+        gripper_stroke_time_s: float = STROKE_TIME_S,
     ) -> None:
         """Begin at the scene's start, with the gripper open.
 
@@ -90,15 +90,14 @@ class MujocoArm:
         self._borne_nm = data.qfrc_constraint
         self._rubbing = np.flatnonzero(model.dof_frictionloss > 0.0)
         self._rubs = np.isin(robot.arm_velocities, self._rubbing)
-        gripper = self._gripper
-        measured = int(robot.gripper_actuators[0]) if gripper is not None else 0
+        gripper, driven = self._gripper, robot.gripper_actuators
         self._plant = Plant(
             self._reference.joints,
             robot.drives.table(model.dof_damping[robot.arm_velocities]),
             inertia_table(model, robot.arm_velocities),
             np.zeros(0, GRIPPER) if gripper is None else gripper.drive,
-            np.zeros((0, 3)) if gripper is None else gripper.samples,
-            np.zeros(0, GRIPPER_INPUT) if gripper is None else gripper.inputs(robot.gripper_controls),
+            np.zeros((0, 4)) if gripper is None else gripper.samples,
+            np.zeros(0, GRIPPER_INPUT) if gripper is None else gripper.inputs(robot.gripper_controls, driven),
             robot.arm_positions.astype(np.int64),
             robot.finger_positions.astype(np.int64),
             robot.arm_velocities.astype(np.int64),
@@ -109,8 +108,8 @@ class MujocoArm:
             data.qfrc_bias,
             data.qfrc_gravcomp,
             data.qfrc_spring,
-            data.actuator_length[measured:],
-            data.actuator_velocity[measured:],
+            data.actuator_length,
+            data.actuator_velocity,
             data.ctrl,
             np.array([(limits.velocity_rad_s, limits.acceleration_rad_s2, limits.deceleration_rad_s2)], LIMITS),
         )

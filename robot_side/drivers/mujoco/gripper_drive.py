@@ -7,19 +7,19 @@ import numpy as np
 
 from common.arrays import FloatArray, IntArray
 from robot_side.compiled.kernel import building_block, inlined
-from robot_side.drivers.mujoco.gripper_measurement import GripperTravel
+from robot_side.drivers.mujoco.gripper_measurement import (
+    LEAD,
+    NOTHING_M,
+    SLOW,
+    SPEED_TIME_CONSTANT_S,
+    STROKE_TIME_S,
+    GripperTravel,
+)
 
-# Something stops the fingers if the drive lags its free position by more than this share of the stroke, and moves
-# slower than this share of the stroke per second, for this time.
-_BLOCKED_LAG = 0.02
+# Something stops the fingers if they rest although the drive leads by more than the gripper itself resists. They rest
+# if they move slower than this share of the stroke per second, for this time.
 _STANDING_SPEED_1_S = 0.05
 _STANDING_TIME_S = 0.05
-# Fingers that hold something may follow its slip. If they close faster than this share of their free speed, it is gone.
-_LOST_SHARE = 0.5
-# Time constant of the measured speed: stiff fingers chatter on a gripped object.
-_SPEED_TIME_CONSTANT_S = 0.05
-# Opening below which the fingers have closed on nothing.
-_CLOSED_OPENING_M = 1e-3
 
 GRIPPER: Final = np.dtype(
     [
@@ -29,57 +29,65 @@ GRIPPER: Final = np.dtype(
         ("standing_s", np.float64),
         ("opening_m", np.float64),
         ("told_to_close", np.int64),
-        ("open_length", np.float64),
-        ("stroke", np.float64),
+        ("least", np.float64),
+        ("most", np.float64),
         ("stroke_time_s", np.float64),
-        ("force_lead", np.float64),
         ("lag_s", np.float64),
     ]
 )
-"""Record of a gripper's drive. reference, closure: commanded and measured position, from 0 (open) to 1 (closed). speed:
-averaged rate of the closure, in 1/s. standing_s: time for which something has stopped the fingers. For the other fields
-see `GripperTravel`."""
-GRIPPER_INPUT: Final = np.dtype([("place", np.int64), ("open", np.float64), ("closed", np.float64)])
-"""Record of a gripper's actuator: its index in ctrl, and its inputs when the gripper is open and closed."""
+"""Record of a gripper's drive. reference, closure: commanded and measured position, from 0 (open) to 1 (closed); the
+reference goes beyond, from `least` to `most`, to press. speed: averaged rate of the closure, in 1/s. standing_s: time
+for which something has stopped the fingers. lag_s: see `GripperTravel`."""
+GRIPPER_INPUT: Final = np.dtype(
+    [
+        ("place", np.int64),
+        ("actuator", np.int64),
+        ("open", np.float64),
+        ("closed", np.float64),
+        ("open_length", np.float64),
+        ("per_length", np.float64),
+    ]
+)
+"""Record of a gripper's actuator: its index in ctrl and among the actuators, its inputs when the gripper is open and
+closed, its length when open, and the weight of its length in the closure."""
 
 
 class GripperDrive:
     """Reference of the gripper between 0 (open) and 1 (closed), and detection of a held object."""
 
-    def __init__(self, travel: GripperTravel, stroke_time_s: float = 0.6) -> None:
-        """Begin with an open gripper. stroke_time_s: time for the whole stroke at full speed.
-
-        The default is that of a Robotiq 2F-85: 85 mm at 150 mm/s (its manual).
-        """
-        stroke = float(travel.lengths[-1] - travel.lengths[0])
+    def __init__(self, travel: GripperTravel, stroke_time_s: float = STROKE_TIME_S) -> None:
+        """Begin with an open gripper. stroke_time_s: time for the whole stroke at full speed."""
         self.drive: np.ndarray = np.zeros(1, GRIPPER)
         """(1,) record of GRIPPER"""
         for name, value in (
             ("opening_m", travel.openings_m[0]),
-            ("open_length", travel.lengths[0]),
-            ("stroke", stroke),
+            ("least", travel.ends[0]),
+            ("most", travel.ends[1]),
             ("stroke_time_s", stroke_time_s),
-            ("force_lead", travel.force_lead),
             ("lag_s", travel.lag_s),
         ):
             self.drive[name] = value
         self.samples: FloatArray = np.column_stack(
-            [(travel.lengths - travel.lengths[0]) / stroke, travel.references, travel.openings_m]
+            [travel.closures, travel.references, travel.openings_m, travel.resists]
         )
-        """(k, 3) closure, reference and opening at samples along the travel"""
+        """(k, 4) closure, reference, opening, and lead that the gripper itself resists, along the travel"""
         self._travel = travel
         self._opening_m, self._standing_s = self.drive["opening_m"], self.drive["standing_s"]
         self._command = 0.0
         self._valid_until_s = -math.inf
 
-    def inputs(self, places: IntArray) -> np.ndarray:
-        """Return records (g,) of GRIPPER_INPUT for the actuators whose inputs are at `places` (g,), indices in ctrl."""
-        inputs = np.zeros(places.shape, GRIPPER_INPUT)
-        inputs["place"], inputs["open"], inputs["closed"] = (
-            places,
-            self._travel.open_control,
-            self._travel.closed_control,
-        )
+    def inputs(self, places: IntArray, actuators: IntArray) -> np.ndarray:
+        """Return records (g,) of GRIPPER_INPUT for the `actuators` (g,) with inputs at `places` (g,) in ctrl."""
+        inputs, travel = np.zeros(places.shape, GRIPPER_INPUT), self._travel
+        for name, values in (
+            ("place", places),
+            ("actuator", actuators),
+            ("open", travel.open_control),
+            ("closed", travel.closed_control),
+            ("open_length", travel.open_lengths),
+            ("per_length", travel.per_length),
+        ):
+            inputs[name] = values
         return inputs
 
     def command(self, closing: float, valid_until_s: float) -> None:
@@ -105,13 +113,17 @@ class GripperDrive:
 
     @property
     def holding(self) -> bool:
-        """Whether an object between the fingers stopped them while they were commanded to close."""
-        return bool(self._standing_s[0] >= _STANDING_TIME_S and self._opening_m[0] > _CLOSED_OPENING_M)
+        """Whether an object between the fingers stopped them while they were commanded to close.
+
+        Never where they stop by themselves: at the gap of the closed gripper, or where it hinders itself.
+        """
+        apart_m = self._opening_m[0] - self._travel.openings_m[-1]
+        return bool(self._standing_s[0] >= _STANDING_TIME_S and apart_m > NOTHING_M)
 
 
 @inlined
 def _at_closure(samples: Any, closure: float, column: int) -> Any:
-    """Return a column of the samples (k, 3) at `closure`, by linear interpolation; constant beyond the ends."""
+    """Return a column of the samples (k, 4) at `closure`, by linear interpolation; constant beyond the ends."""
     if not closure > samples[0, 0]:
         return samples[0, column]
     for k in range(1, samples.shape[0]):
@@ -123,29 +135,28 @@ def _at_closure(samples: Any, closure: float, column: int) -> Any:
 
 @building_block
 def advance_gripper(
-    gripper: Any, samples: FloatArray, moving: float, step_s: float, length: float, length_speed: float
+    gripper: Any, samples: FloatArray, moving: float, step_s: float, closure: float, closure_speed: float
 ) -> None:
-    """Advance one gripper's reference by `step_s`, from the drive's measured length and the speed of this length.
+    """Advance one gripper's reference by `step_s`, from the measured `closure` and its speed in 1/s.
 
     moving: command from `GripperDrive.commanded_at`.
     """
-    gripper.closure = (length - gripper.open_length) / gripper.stroke
-    gripper.opening_m = _at_closure(samples, gripper.closure, 2)
-    gripper.speed += (length_speed / gripper.stroke - gripper.speed) * min(step_s / _SPEED_TIME_CONSTANT_S, 1.0)
-    free = _at_closure(samples, gripper.closure, 1)
+    gripper.closure = closure
+    gripper.opening_m = _at_closure(samples, closure, 2)
+    gripper.speed += (closure_speed - gripper.speed) * min(step_s / SPEED_TIME_CONSTANT_S, 1.0)
+    # A moving drive lags its reference without any force on the fingers.
+    free = _at_closure(samples, closure, 1) + gripper.lag_s * gripper.speed
     if moving != 0.0:
         gripper.told_to_close = 1 if moving > 0.0 else 0
         moved = gripper.reference + moving * step_s / gripper.stroke_time_s
-        # The servo's damping lets a moving drive lag its reference without any force on the fingers. The reference
-        # may lead only in the commanded direction, so that a grip is released at once.
-        center = free + gripper.lag_s * gripper.speed
-        lead = math.copysign(gripper.force_lead, moving)
-        moved = min(max(moved, center + min(lead, 0.0)), center + max(lead, 0.0))
-        gripper.reference = min(max(moved, 0.0), 1.0)
+        # The reference may lead only in the commanded direction, so that a grip is released at once.
+        lead = math.copysign(LEAD, moving)
+        moved = min(max(moved, free + min(lead, 0.0)), free + max(lead, 0.0))
+        gripper.reference = min(max(moved, gripper.least), gripper.most)
 
-    blocked = gripper.reference - free > min(_BLOCKED_LAG, 0.5 * gripper.force_lead)
-    holds = gripper.standing_s >= _STANDING_TIME_S
-    follows = holds and gripper.speed * gripper.stroke_time_s < _LOST_SHARE
+    resisted = gripper.reference - free > _at_closure(samples, closure, 3)
+    # Fingers that hold something may follow its slip. If they close fast, it is gone.
+    follows = gripper.standing_s >= _STANDING_TIME_S and gripper.speed * gripper.stroke_time_s < SLOW
     standing = abs(gripper.speed) < _STANDING_SPEED_1_S or follows
-    stopped = blocked and standing and gripper.told_to_close == 1
+    stopped = resisted and standing and gripper.told_to_close == 1
     gripper.standing_s = gripper.standing_s + step_s if stopped else 0.0

@@ -31,7 +31,7 @@ class Plant(NamedTuple):
     grippers: np.ndarray
     """(g,) records of GRIPPER: one or none"""
     samples: FloatArray
-    """(s, 3) samples of the gripper's travel (see `GripperDrive`)"""
+    """(s, 4) samples of the gripper's travel (see `GripperDrive`)"""
     inputs: np.ndarray
     """(i,) records of GRIPPER_INPUT"""
     positions: IntArray
@@ -52,9 +52,9 @@ class Plant(NamedTuple):
     """(nv,) forces of gravity compensation"""
     sprung: FloatArray
     """(nv,) forces of springs"""
-    gripper_length: FloatArray
-    """Lengths of the actuators, from the gripper's first actuator on; gripper_speed has their speeds"""
-    gripper_speed: FloatArray
+    lengths: FloatArray
+    """(nu,) lengths of the actuators, and `length_speeds` (nu,)"""
+    length_speeds: FloatArray
     ctrl: FloatArray
     """(nu,) inputs of the actuators"""
     limits: np.ndarray
@@ -75,7 +75,7 @@ def inertia_table(model: Any, velocities: IntArray) -> np.ndarray:
 
 PLANT: Final = Declared(
     Plant,
-    *(records(REFERENCE), records(DRIVE), records(INERTIA), records(GRIPPER), rows(3), records(GRIPPER_INPUT)),
+    *(records(REFERENCE), records(DRIVE), records(INERTIA), records(GRIPPER), rows(4), records(GRIPPER_INPUT)),
     *(INDICES,) * 4,
     *(NUMBERS,) * 9,
     records(LIMITS),
@@ -113,8 +113,12 @@ def drive(bundle: IntArray, following: bool, ended: bool, closing: float, step_s
         position_error = joint.position - joint.measured_position
         plant.ctrl[plant.controls[j]] = control(drive, position_error, joint.position, joint.velocity, drive.load)
     for g in range(plant.grippers.size):
-        gripper = plant.grippers[g]
-        advance_gripper(gripper, plant.samples, closing, step_s, plant.gripper_length[g], plant.gripper_speed[g])
+        gripper, closure, closure_speed = plant.grippers[g], 0.0, 0.0
+        for i in range(plant.inputs.size):
+            one = plant.inputs[i]
+            closure += one.per_length * (plant.lengths[one.actuator] - one.open_length)
+            closure_speed += one.per_length * plant.length_speeds[one.actuator]
+        advance_gripper(gripper, plant.samples, closing, step_s, closure, closure_speed)
         for i in range(plant.inputs.size):
             one = plant.inputs[i]
             plant.ctrl[one.place] = one.open + gripper.reference * (one.closed - one.open)

@@ -17,6 +17,7 @@ from common.roles import Role
 from robot_side.arm.port import ArmState
 from robot_side.drivers.mujoco.brought.table import TABLE_PREFIX, attach, keep_from_slipping, settle, usual_place
 from robot_side.drivers.mujoco.built_in_scenes import SceneName, furnish
+from robot_side.drivers.mujoco.gripper_servos import serve_gripper
 from robot_side.drivers.mujoco.model_enums import GeomKind
 from robot_side.drivers.mujoco.object_primitives import ObjectPrimitives, SceneObject
 from robot_side.drivers.mujoco.robot_model import (
@@ -114,8 +115,7 @@ def load_scene(
             spec, site = _read(_ASSETS / "arm.xml"), site or "tool"
         else:
             spec = _read(model_path)
-        model = _compile(spec)
-        robot = find_robot(model, site)
+        model, robot = _with_robot(spec, site)
         _require_step(float(model.opt.timestep))
         turn_site(model, robot.site, site_axis)
         start, start_pose = _start_configuration(model, robot)
@@ -137,8 +137,7 @@ def load_scene(
             spec.add_key(name=start_key, qpos=start)
             attach(table, spec, model, robot, start, place)
             place_m = model.site_pos[robot.site].copy()
-            model = _compile(spec)
-            robot = find_robot(model, site)
+            model, robot = _with_robot(spec, site)
             turn_site(model, robot.site, site_axis)
             put_site(model, robot.site, place_m)
             start = model.key(start_key).qpos
@@ -209,6 +208,13 @@ def _compile(spec: Any) -> Any:
         return spec.compile()
     except (ValueError, mujoco.FatalError) as error:
         raise _unusable(error) from error
+
+
+def _with_robot(spec: Any, site: str | None) -> tuple[Any, RobotModel]:
+    """Return the compiled model, whose gripper's actuators are position servos from now on, and the robot in it."""
+    model = _compile(spec)
+    robot = find_robot(model, site)
+    return (_compile(spec) if serve_gripper(spec, model, robot) else model), robot
 
 
 def _unusable(error: Exception) -> ConfigurationError:

@@ -8,16 +8,12 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from common.arrays import FloatArray
-from robot_side.drivers.mujoco.gripper_cover import placed_corners
-from robot_side.drivers.mujoco.gripper_measurement import GripperTravel, nearest_pair
-from robot_side.drivers.mujoco.mesh_arrays import geom_points
+from robot_side.drivers.mujoco.gripper_gap import AWAY_M, INSIDE_M, convex_geoms
+from robot_side.drivers.mujoco.gripper_measurement import GripperTravel, jaw_places_m, opened
 from robot_side.drivers.mujoco.robot_model import RobotModel, put_site
 
-_INSIDE_M: Final = 0.015
-"""Distance of the tool from the ends of the fingertips, as in the built-in arm"""
-_AWAY_M: Final = 0.02
 _ASIDE_M: Final = 0.005
-"""Distances up to which a site stays: in all, as a person grasps as far past the tool's point; and across the hand"""
+"""Distance across the hand up to which a site stays where it is, if it is not farther than `AWAY_M` in all"""
 BESIDE_M: Final = 0.013
 """Least room between the target and each finger: 3 mm by which the spheres protrude, and 10 mm of the arm's and the
 camera's errors at the usual probability"""
@@ -36,62 +32,27 @@ LOW_INTO_M: Final = 0.01
 
 def move_site(model: Any, robot: RobotModel, start: FloatArray, travel: GripperTravel) -> float:
     """Move the site between the open fingers, near their tips, if it is far from there; return by how much, in m."""
-    data = mujoco.MjData(model)
-    data.qpos[:] = start
+    data = opened(model, robot, start, travel)
     by_m, aside_m = _between(model, data, robot, travel)
     away_m = float(np.linalg.norm(by_m))
-    if away_m <= _AWAY_M and abs(aside_m) <= _ASIDE_M:
+    if away_m <= AWAY_M and abs(aside_m) <= _ASIDE_M:
         return 0.0
     turn = data.xmat[model.site_bodyid[robot.site]].reshape(3, 3)
     put_site(model, robot.site, model.site_pos[robot.site] + turn.T @ by_m)
     return away_m
 
 
-def closing_direction(model: Any, data: Any, robot: RobotModel, travel: GripperTravel) -> FloatArray:
-    """Return the direction (3,) across the tool, in the world, along which the fingers close; leave them open."""
-    moved_m = _closing_motions_m(model, data, robot, travel)
-    across = data.site_xmat[robot.site].reshape(3, 3)[:, :2]
-    moved_across_m = moved_m @ across
-    closing: FloatArray = across @ np.linalg.eigh(moved_across_m.T @ moved_across_m)[1][:, -1]
+def closing_direction(data: Any, robot: RobotModel, travel: GripperTravel) -> FloatArray:
+    """Return the direction (3,) across the tool, in the world, along which the fingers close."""
+    across = np.array([*travel.closing[:2], 0.0])
+    closing: FloatArray = data.site_xmat[robot.site].reshape(3, 3) @ (across / np.linalg.norm(across))
     return closing
 
 
-def still_side(model: Any, data: Any, robot: RobotModel, travel: GripperTravel, closing: FloatArray) -> float:
-    """Return 1 or -1 if only the jaw ahead or behind along `closing` stands still, else 0; leave the fingers open."""
-    moved_m = _closing_motions_m(model, data, robot, travel) @ closing
-    signs = np.sign(moved_m[np.abs(moved_m) > _STILL_M])
-    return float(signs[0]) if signs.size > 0 and (signs == signs[0]).all() else 0.0
-
-
-def _closing_motions_m(model: Any, data: Any, robot: RobotModel, travel: GripperTravel) -> FloatArray:
-    """Return how far each of the gripper's geoms (g, 3) moves, in the world, as the fingers close; leave them open."""
-    places_m = []
-    for fingers in (travel.closed_fingers, travel.open_fingers):
-        data.qpos[robot.finger_positions] = fingers
-        mujoco.mj_kinematics(model, data)
-        places_m.append(data.geom_xpos[robot.gripper_geoms])
-    motions_m: FloatArray = np.subtract(*places_m)
-    return motions_m
-
-
-def room_m(corners_m: FloatArray, from_m: FloatArray, way: FloatArray, most_m: float, *, into: FloatArray) -> float:
-    """Return the distance along the unit vector `way` to the triangles `corners_m` (t, 3, 3), at most `most_m`.
-
-    It is the least one from the points `from_m` (3,), `from_m + into`, and midway.
-    """
-    one, other = corners_m[:, 1] - corners_m[:, 0], corners_m[:, 2] - corners_m[:, 0]
-    across = np.cross(way, other)
-    scale = (one * across).sum(axis=1)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        for part in (0.0, 0.5, 1.0):
-            # Shares of both edges at the place where the ray crosses a triangle's plane, and the way to there.
-            back = from_m + part * into - corners_m[:, 0]
-            turned = np.cross(back, one)
-            first, second = (back * across).sum(axis=1) / scale, turned @ way / scale
-            away_m = (other * turned).sum(axis=1) / scale
-            hits = (first >= 0.0) & (second >= 0.0) & (first + second <= 1.0) & (away_m >= 0.0)
-            most_m = min(most_m, float(away_m[hits].min(initial=np.inf)))
-    return most_m
+def still_side(travel: GripperTravel) -> float:
+    """Return 1 or -1 if only the jaw ahead or behind along `closing_direction` stands still, else 0."""
+    first, second = travel.jaws
+    return float(first.moves) - float(second.moves)
 
 
 def rooms_m(
@@ -99,33 +60,30 @@ def rooms_m(
 ) -> tuple[float, float]:
     """Return the room for a grasped object on either side of `from_m` (3,), at most `most_m`: against, along `closing`.
 
-    The object reaches by `into_m` into the hand.
+    The object reaches by `into_m` into the hand; it is looked for at three points.
     """
-    hand = placed_corners(model, data, robot.gripper_geoms)
-    into = -into_m * data.site_xmat[robot.site].reshape(3, 3)[:, 2]
-    return room_m(hand, from_m, -closing, most_m, into=into), room_m(hand, from_m, closing, most_m, into=into)
+    into = data.site_xmat[robot.site].reshape(3, 3)[:, 2]
+    points_m, rooms = from_m - np.outer([0.0, 0.5 * into_m, into_m], into), [most_m, most_m]
+    for geom, solid in convex_geoms(model, robot.gripper_geoms).items():
+        body = int(model.geom_bodyid[geom])
+        turn = data.xmat[body].reshape(3, 3)
+        for side, way in enumerate((-closing, closing)):
+            enters_m, leaves_m = solid.spans_m((points_m - data.xpos[body]) @ turn, way @ turn)
+            ahead_m = np.where(leaves_m >= 0.0, np.maximum(enters_m, 0.0), np.inf)
+            rooms[side] = min(rooms[side], float(ahead_m.min()))
+    return rooms[0], rooms[1]
 
 
 def _between(model: Any, data: Any, robot: RobotModel, travel: GripperTravel) -> tuple[FloatArray, float]:
-    """Return the way (3,), in the world, from the site to midway between the fingers, inside their ends; and how much
-    of it is across the hand, in m.
+    """Return the way (3,), in the world, from the site to midway between the open fingers, inside their ends; and how
+    much of it is across the hand, in m.
 
     If only one jaw moves, the way ends near the other one instead.
-    The ends are those of the open fingers, or of the closed ones if these reach farther. `data` is left open.
     """
-    fingers, ends_m = robot.gripper_geoms[robot.geom_on_finger], []
-    for positions in (travel.closed_fingers, travel.open_fingers):
-        data.qpos[robot.finger_positions] = positions
-        mujoco.mj_kinematics(model, data)
-        site_m, approach = data.site_xpos[robot.site], data.site_xmat[robot.site].reshape(3, 3)[:, 2]
-        ends_m.append(float(((geom_points(model, data, fingers) - site_m) @ approach).max()))
-    closing = closing_direction(model, data, robot, travel)
-    apart_m = float(travel.openings_m[0])
-    ends = np.zeros(6)
-    mujoco.mj_geomDistance(model, data, *nearest_pair(model, data, robot, apart_m), 2.0 * apart_m, ends)
-    across_m = float((ends.reshape(2, 3).mean(axis=0) - site_m) @ closing)
-    middle_m = across_m * closing + (max(ends_m) - _INSIDE_M) * approach
-    still = still_side(model, data, robot, travel, closing)
+    site_m, approach = data.site_xpos[robot.site].copy(), data.site_xmat[robot.site].reshape(3, 3)[:, 2].copy()
+    closing, apart_m, still = closing_direction(data, robot, travel), float(travel.openings_m[0]), still_side(travel)
+    across_m = float((np.mean(jaw_places_m(data, travel), axis=0) - site_m) @ closing)
+    middle_m = across_m * closing + (travel.ahead_m - INSIDE_M) * approach
     reach_m = (0.5 * apart_m, INTO_M) if still == 0.0 else (_HAND_M, LOW_INTO_M)
     rooms = rooms_m(model, data, robot, site_m + middle_m, closing, *reach_m)
     if still == 0.0:

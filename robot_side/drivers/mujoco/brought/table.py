@@ -22,7 +22,7 @@ from robot_side.drivers.mujoco.brought.fingertips import (
 )
 from robot_side.drivers.mujoco.brought.reach import FROM_ABOVE, NEAR_M, go, grasp_places
 from robot_side.drivers.mujoco.built_in_scenes import make_room
-from robot_side.drivers.mujoco.gripper_measurement import GripperTravel, measure_gripper
+from robot_side.drivers.mujoco.gripper_measurement import GripperTravel, measure_gripper, opened
 from robot_side.drivers.mujoco.mesh_arrays import geom_points
 from robot_side.drivers.mujoco.model_enums import GeomKind
 from robot_side.drivers.mujoco.robot_model import RobotModel, Simulated
@@ -106,7 +106,7 @@ def settle(table: Any, model: Any, robot: RobotModel, start: FloatArray, *, may_
     """
     travel = _travel(model, robot, start)
     moved_m = 0.0 if travel is None else move_site(model, robot, start, travel)
-    low = travel is not None and _has_still_jaw(model, robot, start, travel)
+    low = travel is not None and still_side(travel) != 0.0
     into_m = LOW_INTO_M if low else INTO_M
     thick_m = math.inf if travel is None else _thickest_m(model, robot, start, travel, into_m)
     most = _MOST_STARTS if may_search and robot.arm_joints.size >= _FEWEST_JOINTS else 0
@@ -119,7 +119,7 @@ def settle(table: Any, model: Any, robot: RobotModel, start: FloatArray, *, may_
         fit_target(table, thick_m, low=low)
         settled = Settled(start, usual_place(model, robot, start), moved_m, found=False)
     if travel is not None:
-        closing = closing_direction(model, _placed(model, settled.start), robot, travel)
+        closing = closing_direction(_placed(model, settled.start), robot, travel)
         _turn_target(table, closing, settled.place.yaw_rad)
     make_room(table, *hand_reach_m(model, robot, settled.start, settled.place.yaw_rad)[:2])
     return settled
@@ -214,21 +214,15 @@ def _thickest_m(model: Any, robot: RobotModel, start: FloatArray, travel: Grippe
 
     One jaw may be nearer to the point than the other.
     """
-    data = _placed(model, start)
-    closing, most_m = closing_direction(model, data, robot, travel), 0.5 * float(travel.openings_m[0])
+    data, most_m = opened(model, robot, start, travel), 0.5 * float(travel.openings_m[0])
+    closing = closing_direction(data, robot, travel)
     clear_m = 2.0 * min(rooms_m(model, data, robot, data.site_xpos[robot.site], closing, most_m, into_m))
     return min(_SPANNED * clear_m, clear_m - 2.0 * BESIDE_M)
 
 
-def _has_still_jaw(model: Any, robot: RobotModel, start: FloatArray, travel: GripperTravel) -> bool:
-    """Return whether only one of the hand's jaws moves as it closes."""
-    data = _placed(model, start)
-    return still_side(model, data, robot, travel, closing_direction(model, data, robot, travel)) != 0.0
-
-
 def _lean(model: Any, robot: RobotModel, start: FloatArray, travel: GripperTravel) -> float:
     """Return the vertical part of the direction along which the fingers close at the start."""
-    return abs(float(closing_direction(model, _placed(model, start), robot, travel)[2]))
+    return abs(float(closing_direction(_placed(model, start), robot, travel)[2]))
 
 
 def hand_reach_m(model: Any, robot: RobotModel, start: FloatArray, yaw_rad: float) -> FloatArray:

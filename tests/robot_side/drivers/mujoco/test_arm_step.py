@@ -58,24 +58,23 @@ class PlainGripper:
 
     def __init__(self, travel: GripperTravel) -> None:
         self.travel = travel
-        self.stroke = travel.lengths[-1] - travel.lengths[0]
         self.reference = self.speed = self.standing_s = self.opening_m = 0.0
         self.closed_last = False
 
-    def advance(self, moving: float, step_s: float, length: float, length_speed: float) -> None:
+    def advance(self, moving: float, step_s: float, lengths: FloatArray, length_speeds: FloatArray) -> None:
         travel = self.travel
-        closures = (travel.lengths - travel.lengths[0]) / self.stroke
-        closure = (length - travel.lengths[0]) / self.stroke
-        self.speed += (length_speed / self.stroke - self.speed) * min(step_s / 0.05, 1.0)
-        self.opening_m = np.interp(closure, closures, travel.openings_m)
-        free = np.interp(closure, closures, travel.references)
+        closure = float((lengths - travel.open_lengths) @ travel.per_length)
+        self.speed += (float(length_speeds @ travel.per_length) - self.speed) * min(step_s / 0.05, 1.0)
+        self.opening_m = float(np.interp(closure, travel.closures, travel.openings_m))
+        free = np.interp(closure, travel.closures, travel.references) + travel.lag_s * self.speed
         if moving:
             self.closed_last = moving > 0.0
-            lead = sorted([0.0, math.copysign(travel.force_lead, moving)])
-            nearest, farthest = (free + travel.lag_s * self.speed + end for end in lead)
-            self.reference = np.clip(np.clip(self.reference + moving * step_s / 0.6, nearest, farthest), 0.0, 1.0)
-        blocked = self.reference - free > min(0.02, 0.5 * travel.force_lead)
-        self.standing_s = self.standing_s + step_s if blocked and abs(self.speed) < 0.05 and self.closed_last else 0.0
+            lead = sorted([0.0, math.copysign(0.3, moving)])
+            nearest, farthest = (free + end for end in lead)
+            self.reference = np.clip(np.clip(self.reference + moving * step_s / 0.6, nearest, farthest), *travel.ends)
+        resisted = self.reference - free > np.interp(closure, travel.closures, travel.resists)
+        stands = abs(self.speed) < 0.05 or (self.standing_s >= 0.05 and self.speed * 0.6 < 0.5)
+        self.standing_s = self.standing_s + step_s if resisted and stands and self.closed_last else 0.0
 
     @property
     def control(self) -> FloatArray:
@@ -161,9 +160,9 @@ def test_every_step_is_what_plain_formulas_say(tmp_path: Path, load: Callable[[P
             assert np.abs(reference.velocity - before).max() <= LIMITS.deceleration_rad_s2 * step_s + 1e-12
         control, torque = plain_inputs(scene, reference)
         if gripper is not None:
-            actuator = robot.gripper_actuators[0]
-            length, length_speed = data.actuator_length[actuator], data.actuator_velocity[actuator]
-            gripper.advance(closing if now_s < closing_ends_s else 0.0, step_s, length, length_speed)
+            of = robot.gripper_actuators
+            lengths, speeds = data.actuator_length[of].copy(), data.actuator_velocity[of].copy()
+            gripper.advance(closing if now_s < closing_ends_s else 0.0, step_s, lengths, speeds)
         state = arm.state(now_s + step_s)
         np.testing.assert_allclose(data.ctrl[robot.arm_controls], control, rtol=1e-12, atol=1e-12)
         np.testing.assert_array_equal(state.joint_positions_rad, data.qpos[robot.arm_positions])
@@ -174,7 +173,9 @@ def test_every_step_is_what_plain_formulas_say(tmp_path: Path, load: Callable[[P
         if gripper is not None:
             np.testing.assert_allclose(data.ctrl[robot.gripper_controls], gripper.control, rtol=1e-12, atol=1e-12)
             assert state.gripper_opening_m == pytest.approx(gripper.opening_m, abs=1e-12)
-            assert state.gripper_holding == (gripper.standing_s >= 0.05 and gripper.opening_m > 1e-3)
+            assert state.gripper_holding == (
+                gripper.standing_s >= 0.05 and gripper.opening_m - gripper.travel.openings_m[-1] > 1e-3
+            )
     assert min(followed, ran_out) > STEPS // 5
 
 

@@ -14,61 +14,52 @@ from robot_side.drivers.mujoco import gripper_cover
 from robot_side.drivers.mujoco.gripper_cover import cover_gripper
 from robot_side.drivers.mujoco.gripper_drive import GRIPPER, GripperDrive, advance_gripper
 from robot_side.drivers.mujoco.gripper_measurement import (
-    GripperSweep,
     candidate_ends,
-    jaw_pairs,
     measure_gripper,
     open_gap,
-    travel_from_sweep,
+    resistance,
+    rising,
 )
+from robot_side.drivers.mujoco.gripper_sweep import ClosingRun
 from robot_side.drivers.mujoco.scene import load_scene
 from robot_side.gripper.surface_cover import cover_surface
 from tests.helpers.arm_models import TENDON_GRIPPER, planar_arm
 
 
-def sweep(openings_m: FloatArray, lengths: FloatArray) -> GripperSweep:
-    """Return a sweep of a gripper with one finger joint. Of its pairs of parts, one has a constant gap."""
-    controls = np.arange(len(lengths), dtype=np.float64)[:, None]
-    gaps_m = np.column_stack([openings_m, openings_m + 0.02, np.full(len(lengths), 0.01)])
-    return GripperSweep(controls, lengths[:, None], lengths, gaps_m)
+def test_where_inputs_move_nothing_the_last_counts_and_at_the_end_the_first() -> None:
+    np.testing.assert_array_equal(rising(np.array([0.0, 0.3, 0.3, 0.25, 0.7, 1.0, 1.0])), [0, 3, 4, 5])
+    np.testing.assert_array_equal(rising(np.linspace(0.0, 1.0, 4)), [0, 1, 2, 3])
 
 
-@pytest.mark.parametrize("low_is_open", [True, False])
-def test_the_wider_end_is_the_open_one(low_is_open: bool) -> None:
-    openings = np.array([0.08, 0.05, 0.03, 0.0])
-    found = travel_from_sweep(sweep(openings if low_is_open else openings[::-1], np.array([0.0, 0.3, 0.5, 0.8])), 0, 0)
-    assert found is not None
-    assert (found.open_control.item(), found.closed_control.item()) == ((0.0, 3.0) if low_is_open else (3.0, 0.0))
-    np.testing.assert_allclose(found.openings_m, openings)
+def test_what_slow_fingers_alone_resist_is_told_from_their_lag() -> None:
+    """A drive lags by 0.1 s, and hangs halfway, until it leads by 0.2 more."""
+    times_s = np.arange(0.0, 1.2, 0.001)
+    moved = np.maximum(np.minimum(times_s, 0.4), times_s - 0.2)
+    run = ClosingRun(
+        (moved + 0.1 + np.where((times_s > 0.4) & (times_s < 0.6), times_s - 0.4, 0.0)) * 1.0,
+        moved,
+        np.gradient(moved, 0.001),
+    )
+    samples = np.linspace(0.0, 1.0, 6)
+    lag_s, resists = resistance(run, samples, samples, 0.08 * (1.0 - samples))
+    assert lag_s == pytest.approx(0.1)
+    np.testing.assert_allclose(resists, [0.0, 0.3, 0.3, 0.3, 0.0, 0.0], atol=5e-3)
 
 
-def test_fingers_that_meet_before_the_inputs_end_keep_a_monotone_travel() -> None:
-    found = travel_from_sweep(sweep(np.array([0.08, 0.04, 0.0, 0.0]), np.array([0.0, 0.4, 0.8, 0.8])), 0.0, 0.0)
-    assert found is not None
-    np.testing.assert_allclose(found.references, [0.0, 1.0 / 3.0, 2.0 / 3.0])
-    np.testing.assert_allclose(found.openings_m, [0.08, 0.04, 0.0])
-    # A pair that is always 20 mm nearer passes through itself, and grips nothing.
-    passing = travel_from_sweep(sweep(np.array([0.06, 0.02, -0.02, -0.02]), np.array([0.0, 0.4, 0.8, 0.8])), 0.0, 0.0)
-    assert passing is not None
-    np.testing.assert_allclose(passing.openings_m, [0.08, 0.04, 0.0])
-    assert travel_from_sweep(sweep(np.full(4, 0.05), np.linspace(0.0, 1.0, 4)), 0.0, 0.0) is None
-
-
-def test_a_servo_leads_by_its_force_and_lags_by_its_damping(tmp_path: Path) -> None:
+def test_a_servo_lags_by_all_damping(tmp_path: Path) -> None:
     travel = measure_gripper(load_scene(planar_arm(tmp_path), "tcp"))
     assert travel is not None
-    # Of 100 N at 0.0156863 N for each of 255 steps, the default share of the stroke is less.
-    assert travel.force_lead == 0.3
-    assert travel.lag_s == pytest.approx(10.0 / 100.0)
+    # The damping of the servo and of both fingers, for each N/m.
+    assert travel.lag_s == pytest.approx((10.0 + 2.0 * 10.0) / 100.0, rel=0.1)
     assert (travel.open_control.item(), travel.closed_control.item()) == (255.0, 0.0)
     np.testing.assert_allclose(travel.openings_m[[0, -1]], [0.08, 0.0], atol=1e-3)
 
 
 @compiled(record_array(GRIPPER), output_array(2), FLOAT64, FLOAT64, FLOAT64, FLOAT64)
 def advance_one(
-    grippers: Any, samples: FloatArray, moving: float, step_s: float, length: float, length_speed: float
+    grippers: Any, samples: FloatArray, moving: float, step_s: float, closure: float, closure_speed: float
 ) -> None:
-    advance_gripper(grippers[0], samples, moving, step_s, length, length_speed)
+    advance_gripper(grippers[0], samples, moving, step_s, closure, closure_speed)
 
 
 def test_what_slips_between_the_fingers_is_held_until_they_close_fast_or_open(tmp_path: Path) -> None:
@@ -78,11 +69,9 @@ def test_what_slips_between_the_fingers_is_held_until_they_close_fast_or_open(tm
 
     def move(speed_1_s: float, duration_s: float, moving: float = 1.0) -> bool:
         nonlocal closure
-        stroke = float(travel.lengths[-1] - travel.lengths[0])
         for _ in range(round(duration_s / 0.001)):
             closure += 0.001 * speed_1_s
-            length = float(travel.lengths[0]) + stroke * closure
-            advance_one(drive.drive, drive.samples, moving, 0.001, length, stroke * speed_1_s)
+            advance_one(drive.drive, drive.samples, moving, 0.001, closure, speed_1_s)
         return drive.holding
 
     assert move(0.0, 0.5)
@@ -110,11 +99,6 @@ def test_two_actuators_may_run_against_each_other() -> None:
     assert ends == [([0.0, -1.0], [1.0, 0.0]), ([0.0, 0.0], [1.0, -1.0])]
     assert len(candidate_ends(np.zeros(1), np.ones(1))) == 1
     assert len(candidate_ends(np.zeros(4), np.ones(4))) == 1
-
-
-def test_pairs_have_a_finger_and_two_bodies() -> None:
-    pairs = jaw_pairs(np.array([7, 8, 9, 10]), np.array([1, 2, 2, 3]), np.array([False, True, True, False]))
-    assert pairs == [(8, 7), (9, 7), (10, 8), (10, 9)]
 
 
 @pytest.mark.parametrize("stand_out_m", [0.001, 0.003, 0.006])

@@ -1,0 +1,210 @@
+"""Sweep of a simulated gripper: where its fingers rest in empty space, over those inputs that move them."""
+
+import copy
+from dataclasses import dataclass
+from typing import Any, Final, NamedTuple
+
+import mujoco  # type: ignore[import-untyped]
+import numpy as np
+
+from common.arrays import FloatArray
+from robot_side.drivers.mujoco.gripper_gap import HandPoses
+from robot_side.drivers.mujoco.mesh_arrays import geom_points
+from robot_side.drivers.mujoco.robot_model import Simulated
+
+_SAMPLES: Final = 9
+_SHORTEST_SETTLING_S, _LONGEST_SETTLING_S = 0.05, 2.0
+_RESTING: Final = 1e-3
+"""Speed of a finger's joint, in rad/s or m/s, below which it rests"""
+_RESTED_S: Final = 0.02
+_UNMOVED: Final = 0.01
+"""Share of an actuator's travel up to which inputs have moved nothing"""
+_EVEN: Final = 0.75
+"""Least step at an end, as a share of the largest step between samples, at which no inputs are dead there"""
+_FINE: Final = 1.0 / 32.0
+"""Largest share of the travel by which dead inputs may be left"""
+
+
+_AFTER_S: Final = 0.4
+"""Time after the last input of a run, in which slow fingers may arrive"""
+_SMALLEST: Final = 1e-6
+"""Change of an actuator's length, in its own unit, below which its inputs move nothing"""
+
+
+@dataclass(frozen=True)
+class GripperSweep:
+    """Rest positions of a gripper at k inputs, evenly spaced for each of its g actuators."""
+
+    controls: FloatArray
+    """(k, g) inputs of the actuators"""
+    fingers: FloatArray
+    """(k, f) positions of the fingers' joints, within their ranges"""
+    lengths: FloatArray
+    """(k, g) lengths of the actuators there, each in the unit of its transmission"""
+    poses: HandPoses
+    ahead_m: float
+    """How far the fingers reach ahead of the tool's site, open or closed, in m"""
+
+    @property
+    def per_length(self) -> FloatArray:
+        """(g,) weights with which the actuators' lengths add up to a position, 0 at the first sample and 1 at the last.
+
+        0 for an actuator that moves nothing.
+        """
+        way = self.lengths[-1] - self.lengths[0]
+        moves = np.abs(way) > _SMALLEST
+        weights: FloatArray = np.divide(1.0, way * max(moves.sum(), 1), out=np.zeros_like(way), where=moves)
+        return weights
+
+
+class ClosingRun(NamedTuple):
+    """Run of the gripper in which it closes on nothing, at n steps."""
+
+    references: FloatArray
+    """(n,) inputs as shares of the way from open (0) to closed (1)"""
+    closures: FloatArray
+    """(n,) positions from 0 to 1"""
+    speeds: FloatArray
+    """(n,) rates of the closures, averaged, in 1/s"""
+
+
+class EmptySpace:
+    """Copy of a scene's gripper in empty space; its arm is without drive, and put back after every step."""
+
+    def __init__(self, scene: Simulated) -> None:
+        """Begin at the scene's present configuration."""
+        self.robot, self.actuators = scene.robot, scene.robot.gripper_actuators
+        self.model: Any = copy.copy(scene.model)
+        model = self.model
+        self._gravity = float(np.linalg.norm(model.opt.gravity))
+        model.opt.gravity[:] = 0.0
+        elsewhere = model.body_rootid[model.geom_bodyid] != self.robot.root_body
+        model.geom_contype[elsewhere] = model.geom_conaffinity[elsewhere] = 0
+        idle = np.setdiff1d(np.arange(model.nu), self.actuators)
+        model.actuator_gainprm[idle] = model.actuator_biasprm[idle] = 0.0
+        self.data, self._within = mujoco.MjData(model), mujoco.MjData(model)
+        self._start = scene.data.qpos.copy()
+        self._held = self._start[self.robot.arm_positions]
+        joints = [np.flatnonzero(model.jnt_qposadr == place)[0] for place in self.robot.finger_positions]
+        limited = model.jnt_limited[joints].astype(bool)
+        self._lower = np.where(limited, model.jnt_range[joints, 0], -np.inf)
+        self._upper = np.where(limited, model.jnt_range[joints, 1], np.inf)
+
+    def step(self, control: FloatArray) -> None:
+        """Advance by one step with the actuators' inputs `control` (g,)."""
+        data, robot = self.data, self.robot
+        data.ctrl[robot.gripper_controls] = control
+        mujoco.mj_step(self.model, data)
+        data.qpos[robot.arm_positions] = self._held
+        data.qvel[robot.arm_velocities] = 0.0
+
+    @property
+    def rests(self) -> bool:
+        """Whether the fingers stand."""
+        return bool(np.abs(self.data.qvel[self.robot.finger_velocities]).max(initial=0.0) < _RESTING)
+
+    def settle(self, control: FloatArray) -> Any:
+        """Let the fingers come to rest at `control` (g,); return their state, an MjData, within the joints' ranges.
+
+        Limits are soft: strong inputs push a joint beyond its range.
+        """
+        timestep_s, rested_s = self.model.opt.timestep, 0.0
+        for step in range(round(_LONGEST_SETTLING_S / timestep_s)):
+            self.step(control)
+            # Fingers that swing stand for a moment, too.
+            rested_s = rested_s + timestep_s if self.rests else 0.0
+            if rested_s > _RESTED_S and step * timestep_s > _SHORTEST_SETTLING_S:
+                break
+        within, places = self._within, self.robot.finger_positions
+        within.qpos[:] = self.data.qpos
+        within.qpos[places] = np.clip(within.qpos[places], self._lower, self._upper)
+        mujoco.mj_kinematics(self.model, within)
+        mujoco.mj_comPos(self.model, within)
+        mujoco.mj_tendon(self.model, within)
+        mujoco.mj_transmission(self.model, within)
+        return within
+
+    def lengths(self, control: FloatArray) -> FloatArray:
+        """Return the actuators' lengths (g,) at rest at `control` (g,)."""
+        lengths: FloatArray = self.settle(control).actuator_length[self.actuators].copy()
+        return lengths
+
+    def sweep(self, first: FloatArray, last: FloatArray) -> GripperSweep:
+        """Return the rest positions at inputs from `first` (g,) to `last` (g,)."""
+        robot, bodies = self.robot, (self.model.nbody, 3)
+        mujoco.mj_resetData(self.model, self.data)
+        self.data.qpos[:] = self._start
+        controls = np.linspace(first, last, _SAMPLES)
+        fingers, lengths, rotations, positions_m, ahead_m = [], [], [], [], []
+        for control in controls:
+            at = self.settle(control)
+            frame = at.site_xmat[robot.site].reshape(3, 3)
+            fingers.append(at.qpos[robot.finger_positions].copy())
+            lengths.append(at.actuator_length[self.actuators].copy())
+            rotations.append(frame.T @ at.xmat.reshape(*bodies, 3))
+            positions_m.append((at.xpos - at.site_xpos[robot.site]) @ frame)
+            points_m = geom_points(self.model, at, robot.gripper_geoms[robot.geom_on_finger])
+            ahead_m.append(float(((points_m - at.site_xpos[robot.site]) @ frame[:, 2]).max(initial=0.0)))
+        poses = HandPoses(np.array(rotations), np.array(positions_m))
+        return GripperSweep(controls, np.array(fingers), np.array(lengths), poses, max(ahead_m[0], ahead_m[-1]))
+
+    def close(self, sweep: GripperSweep, most: float, stroke_time_s: float, averaged_s: float) -> ClosingRun:
+        """Close on nothing by inputs that rise in `stroke_time_s` from open (0) to closed (1), and on to `most`.
+
+        sweep: from open to closed. averaged_s: time constant of the speeds.
+        """
+        self.settle(sweep.controls[0])
+        timestep_s, samples, speed = float(self.model.opt.timestep), [], 0.0
+        way, weights = sweep.controls[-1] - sweep.controls[0], sweep.per_length
+        for step in range(round((most * stroke_time_s + _AFTER_S) / timestep_s)):
+            reference = min(step * timestep_s / stroke_time_s, most)
+            self.step(sweep.controls[0] + reference * way)
+            lengths, rates = (
+                values[self.actuators] for values in (self.data.actuator_length, self.data.actuator_velocity)
+            )
+            speed += (float(rates @ weights) - speed) * min(timestep_s / averaged_s, 1.0)
+            samples.append((reference, float((lengths - sweep.lengths[0]) @ weights), speed))
+        return ClosingRun(*np.array(samples).T)
+
+    def sag(self, sweep: GripperSweep) -> float:
+        """Return by how much the fingers' weight moves them at most, halfway, as a share of their travel."""
+        model, geoms = self.model, self.robot.gripper_geoms[self.robot.geom_on_finger]
+        if (model.body_gravcomp[model.geom_bodyid[geoms]] >= 1.0).all():
+            return 0.0
+        control, moved = sweep.controls[_SAMPLES // 2], []
+        level = self.lengths(control)
+        for axis in range(3):
+            model.opt.gravity[axis] = self._gravity
+            moved.append((self.lengths(control) - level) @ sweep.per_length)
+            model.opt.gravity[axis] = 0.0
+        return float(np.linalg.norm(moved))
+
+    def moving_ends(self, sweep: GripperSweep) -> tuple[FloatArray, FloatArray]:
+        """Return those inputs (g,) of a sweep between which each actuator moves its fingers, found by bisection."""
+        shares, lengths = np.linspace(0.0, 1.0, _SAMPLES), sweep.lengths
+        first, last = sweep.controls[0], sweep.controls[-1]
+        low, high = _dead(shares, lengths), 1.0 - _dead(1.0 - shares[::-1], lengths[::-1])[:, ::-1]
+        # For each actuator: (unmoved, moved) at the first end, (moved, unmoved) at the last one.
+        ends = np.stack([low, high], axis=1)
+        moved = _UNMOVED * np.ptp(lengths, axis=0)
+        while True:
+            widths = np.ptp(ends, axis=2) / (ends[:, 1, 1] - ends[:, 0, 0])[:, None]
+            actuator, end = np.unravel_index(widths.argmax(), widths.shape)
+            if widths[actuator, end] <= _FINE:
+                return first + ends[:, 0, 0] * (last - first), first + ends[:, 1, 1] * (last - first)
+            share = float(ends[actuator, end].mean())
+            at = self.lengths(first + share * (last - first))
+            for one, (near, far) in enumerate(ends):
+                if near[0] < share < near[1]:
+                    near[int(abs(at[one] - lengths[0, one]) > moved[one])] = share
+                if far[0] < share < far[1]:
+                    far[int(abs(at[one] - lengths[-1, one]) <= moved[one])] = share
+
+
+def _dead(shares: FloatArray, lengths: FloatArray) -> FloatArray:
+    """Return the shares (g, 2) between which each actuator begins to move; (0, 0) if it does so from the first one."""
+    steps = np.abs(np.diff(lengths, axis=0))
+    travels = np.ptp(lengths, axis=0)
+    moved = (np.abs(lengths - lengths[0]) > _UNMOVED * travels).argmax(axis=0)
+    even = (steps[0] >= _EVEN * steps.max(axis=0)) | (travels < _SMALLEST)
+    return np.where(even[:, None], 0.0, np.column_stack([shares[moved - 1], shares[moved]]))
