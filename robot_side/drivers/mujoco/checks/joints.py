@@ -1,13 +1,14 @@
 """Check of a model's joints: what is held, what can hardly move, and whether the fingers can span the target."""
 
 import math
+from itertools import combinations
 from typing import Any, Final
 
 import mujoco  # type: ignore[import-untyped]
 import numpy as np
 
 from common.roles import Role
-from robot_side.drivers.mujoco.gripper_measurement import GripperTravel, jaw_pairs
+from robot_side.drivers.mujoco.gripper_measurement import GripperTravel
 from robot_side.drivers.mujoco.model_enums import JointKind
 from robot_side.drivers.mujoco.robot_model import moves_any
 from robot_side.drivers.mujoco.scene import Scene
@@ -90,7 +91,10 @@ def _filled(scene: Scene) -> str:
     """Return how deep the hand's parts are inside each other at the start, if that leaves no gap: meshes are convex."""
     model, robot = scene.model, scene.robot
     deepest_m, one, other = 0.0, 0, 0
-    for a, b in jaw_pairs(robot.gripper_geoms, model.geom_bodyid[robot.gripper_geoms], robot.geom_on_finger):
+    on_finger = set(robot.gripper_geoms[robot.geom_on_finger].tolist())
+    for a, b in combinations(robot.gripper_geoms.tolist(), 2):
+        if on_finger.isdisjoint((a, b)) or model.geom_bodyid[a] == model.geom_bodyid[b]:
+            continue
         if (apart_m := mujoco.mj_geomDistance(model, scene.data, a, b, 1.0, None)) < deepest_m:
             deepest_m, one, other = apart_m, a, b
     if deepest_m > -_FILLS_M:
