@@ -1,5 +1,6 @@
 """Small robot arms in MJCF, unlike the built-in arm, which tests write to files and load as a user's own model."""
 
+import re
 from pathlib import Path
 
 # A planar arm whose gripper is like a Franka hand's: one tendon over both fingers, and a high input opens it.
@@ -49,6 +50,22 @@ POSITION_SERVOS = (
 )
 VELOCITY_SERVOS = '<velocity name="shoulder" joint="shoulder" kv="200"/><velocity name="elbow" joint="elbow" kv="100"/>'
 MOTORS = '<motor name="shoulder" joint="shoulder" gear="50"/><motor name="elbow" joint="elbow"/>'
+# Several actuators on each joint: servos of position and velocity, also with small inputs and no force limit; servos
+# and motors, of which neither could do all; two servos; MuJoCo's own for two inputs; and a spring beside a motor.
+SEVERAL = [
+    POSITION_SERVOS + VELOCITY_SERVOS,
+    VELOCITY_SERVOS.replace("kv", 'ctrlrange="-0.1 0.1" kv') + POSITION_SERVOS.replace('kv="50"', 'kv="0"'),
+    POSITION_SERVOS.replace("kp", 'forcerange="-25 25" kp') + MOTORS.replace("joint=", 'ctrlrange="-10 10" joint='),
+    POSITION_SERVOS + POSITION_SERVOS.replace("kp", 'gear="-2" kp'),
+    VELOCITY_SERVOS + MOTORS,
+    "".join(f'<pid name="{joint}" joint="{joint}" kp="800" kv="40"/>' for joint in ("shoulder", "elbow")),
+    "".join(
+        f'<general joint="{joint}" biastype="affine" biasprm="1 -20 -1" gainprm="0"/>'
+        for joint in ("shoulder", "elbow")
+    )
+    + MOTORS,
+]
+SEVERAL = [re.sub('name="[a-z]+" joint', "joint", actuators) for actuators in SEVERAL]
 # As in the Franka hand of MuJoCo's own collection of models: 0 is closed, 255 is open.
 TENDON_GRIPPER = (
     '<general name="hand" tendon="split" forcerange="-100 100" ctrlrange="0 255" biastype="affine"'

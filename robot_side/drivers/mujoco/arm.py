@@ -10,13 +10,13 @@ from common.arrays import FloatArray
 from common.clock import Clock
 from common.errors import FeelaheadError
 from robot_side.arm.port import ArmState
+from robot_side.drivers.mujoco.actuators import moves_any
 from robot_side.drivers.mujoco.encoders import Encoder
 from robot_side.drivers.mujoco.gripper_drive import GRIPPER, GRIPPER_INPUT, GripperDrive
 from robot_side.drivers.mujoco.gripper_measurement import STROKE_TIME_S, GripperTravel, measure_gripper
 from robot_side.drivers.mujoco.joint_drives import hold_idle
 from robot_side.drivers.mujoco.joint_reference import JointReference, MotionLimits
 from robot_side.drivers.mujoco.plant import LIMITS, PLANT, Plant, drive, inertia_table, sense
-from robot_side.drivers.mujoco.robot_model import moves_any
 from robot_side.drivers.mujoco.scene import Scene
 
 _LONGEST_ADVANCE_S = 2.0
@@ -83,7 +83,7 @@ class MujocoArm:
         windup_rad = robot.drives.windup_rad(limits.windup_rad, model.dof_frictionloss[robot.arm_velocities])
         self._reference = JointReference(start, *self.ends_rad, limits, windup_rad)
         mujoco.mj_forward(model, data)
-        of_arm = [actuator for actuator in range(model.nu) if moves_any(model, actuator, robot.arm_joints)]
+        of_arm = [actuator for actuator in range(model.nactuator) if moves_any(model, actuator, robot.arm_joints)]
         hold_idle(model, data, np.union1d(of_arm, robot.gripper_actuators).astype(np.int64))
         # MuJoCo's arrays keep their addresses; fetching one costs more than its use in a step.
         self._unstable = data.warning.number[_UNSTABLE]
@@ -94,6 +94,7 @@ class MujocoArm:
         self._plant = Plant(
             self._reference.joints,
             robot.drives.table(model.dof_damping[robot.arm_velocities]),
+            robot.drives.inputs(),
             inertia_table(model, robot.arm_velocities),
             np.zeros(0, GRIPPER) if gripper is None else gripper.drive,
             np.zeros((0, 4)) if gripper is None else gripper.samples,
@@ -101,7 +102,6 @@ class MujocoArm:
             robot.arm_positions.astype(np.int64),
             robot.finger_positions.astype(np.int64),
             robot.arm_velocities.astype(np.int64),
-            robot.arm_controls.astype(np.int64),
             data.qpos,
             data.qvel,
             data.M,

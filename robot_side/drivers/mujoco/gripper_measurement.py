@@ -76,17 +76,17 @@ def measure_gripper(scene: Simulated) -> GripperTravel | None:
     None without a gripper, or if its jaws do not close beside the tool. ConfigurationError for a gripper actuator whose
     range of inputs is not known.
     """
-    model, actuators = scene.model, scene.robot.gripper_actuators
+    model, actuators, controls = scene.model, scene.robot.gripper_actuators, scene.robot.gripper_controls
     if actuators.size == 0:
         return None
-    unknown = actuators[~model.actuator_ctrllimited[actuators].astype(bool)]
+    unknown = actuators[~model.actuator_ctrllimited[controls].astype(bool)]
     if unknown.size:
         named = model.actuator(int(unknown[0])).name or int(unknown[0])
         raise ConfigurationError(
             f"model: the gripper's actuator {named!r} has no ctrlrange; valid: the inputs at which the gripper is open"
             " and closed"
         )
-    space, (lower, upper) = EmptySpace(scene), model.actuator_ctrlrange[actuators].T
+    space, (lower, upper) = EmptySpace(scene), model.actuator_ctrlrange[controls].T
     solids = convex_geoms(model, scene.robot.gripper_geoms)
 
     def gap_of(sweep: GripperSweep) -> Gap | None:

@@ -21,7 +21,7 @@ def serve_gripper(spec: Any, model: Any, robot: RobotModel) -> bool:
     actuator whose joints have no ranges.
     """
     found = False
-    for actuator in robot.gripper_actuators[model.actuator_ctrllimited[robot.gripper_actuators].astype(bool)].tolist():
+    for actuator in robot.gripper_actuators[model.actuator_ctrllimited[robot.gripper_controls].astype(bool)].tolist():
         gain, bias = abs(float(model.actuator_gainprm[actuator, 0])), model.actuator_biasprm[actuator]
         if model.actuator_biastype[actuator] == BiasKind.NONE:
             bias = np.zeros_like(bias)
@@ -39,7 +39,7 @@ def serve_gripper(spec: Any, model: Any, robot: RobotModel) -> bool:
             )
         servo, stiffness, damping = spec.actuators[actuator], -float(bias[1]), -float(bias[2])
         if takes_force:
-            strongest = gain * float(np.abs(model.actuator_ctrlrange[actuator]).max())
+            strongest = gain * float(np.abs(model.actuator_ctrlrange[model.actuator_ctrladr[actuator]]).max())
             if model.actuator_forcelimited[actuator]:
                 strongest = min(strongest, float(np.abs(model.actuator_forcerange[actuator]).min()))
             stiffness = strongest / (_FULL_FORCE * (longest - shortest))

@@ -80,7 +80,7 @@ class EmptySpace:
         model.opt.gravity[:] = 0.0
         elsewhere = model.body_rootid[model.geom_bodyid] != self.robot.root_body
         model.geom_contype[elsewhere] = model.geom_conaffinity[elsewhere] = 0
-        idle = np.setdiff1d(np.arange(model.nu), self.actuators)
+        idle = np.setdiff1d(np.arange(model.nactuator), self.actuators)
         model.actuator_gainprm[idle] = model.actuator_biasprm[idle] = 0.0
         self.data, self._within = mujoco.MjData(model), mujoco.MjData(model)
         self._start = scene.data.qpos.copy()

@@ -11,5 +11,7 @@ GeomKind = IntEnum("GeomKind", "PLANE HFIELD SPHERE CAPSULE ELLIPSOID CYLINDER B
 TransmissionKind = IntEnum("TransmissionKind", "JOINT JOINT_IN_PARENT SLIDER_CRANK TENDON", start=0)
 WrappedKind = IntEnum("WrappedKind", "NONE JOINT", start=0)
 """Kinds of elements of which a fixed tendon consists"""
-GainKind = IntEnum("GainKind", "FIXED", start=0)
+GainKind = IntEnum("GainKind", "FIXED AFFINE MUSCLE DCMOTOR SO3 PID", start=0)
+DynamicsKind = IntEnum("DynamicsKind", "NONE", start=0)
+"""Kinds of internal states of actuators"""
 BiasKind = IntEnum("BiasKind", "NONE AFFINE", start=0)

@@ -9,7 +9,7 @@ from robot_side.compiled.columns import BUNDLE, INDICES, NUMBERS, Declared, reco
 from robot_side.compiled.kernel import BOOL, FLOAT64, compiled, output_array
 from robot_side.drivers.mujoco.encoders import reading
 from robot_side.drivers.mujoco.gripper_drive import GRIPPER, GRIPPER_INPUT, advance_gripper
-from robot_side.drivers.mujoco.joint_drives import DRIVE, control, motor_acceleration
+from robot_side.drivers.mujoco.joint_drives import DRIVE, INPUT, control, motor_acceleration, servo_velocity
 from robot_side.drivers.mujoco.joint_reference import REFERENCE, advance_references
 
 INERTIA: Final = np.dtype([("place", np.int64), ("row", np.int64), ("column", np.int64)])
@@ -26,6 +26,8 @@ class Plant(NamedTuple):
     """(n,) records of REFERENCE"""
     drives: np.ndarray
     """(n,) records of DRIVE"""
+    joint_inputs: np.ndarray
+    """(k,) records of INPUT, one or more for each joint"""
     inertia: np.ndarray
     """(k,) records of INERTIA: the elements of `mass` that belong to the arm"""
     grippers: np.ndarray
@@ -40,8 +42,6 @@ class Plant(NamedTuple):
     """(f,) indices of the fingers' joints in qpos"""
     velocities: IntArray
     """(n,) indices of the joints in qvel"""
-    controls: IntArray
-    """(n,) indices of the joints' actuators in ctrl"""
     qpos: FloatArray
     qvel: FloatArray
     mass: FloatArray
@@ -75,8 +75,9 @@ def inertia_table(model: Any, velocities: IntArray) -> np.ndarray:
 
 PLANT: Final = Declared(
     Plant,
-    *(records(REFERENCE), records(DRIVE), records(INERTIA), records(GRIPPER), rows(4), records(GRIPPER_INPUT)),
-    *(INDICES,) * 4,
+    *(records(REFERENCE), records(DRIVE), records(INPUT), records(INERTIA), records(GRIPPER), rows(4)),
+    records(GRIPPER_INPUT),
+    *(INDICES,) * 3,
     *(NUMBERS,) * 9,
     records(LIMITS),
 )
@@ -108,20 +109,21 @@ def drive(bundle: IntArray, following: bool, ended: bool, closing: float, step_s
         drives[row].load += element * drives[column].acceleration
         if row != column:
             drives[column].load += element * drives[row].acceleration
-    for j in range(joints.size):
-        joint, drive = joints[j], drives[j]
-        position_error = joint.position - joint.measured_position
-        plant.ctrl[plant.controls[j]] = control(drive, position_error, joint.position, joint.velocity, drive.load)
+    for k in range(plant.joint_inputs.size):
+        one = plant.joint_inputs[k]
+        joint, drive = joints[one.joint], drives[one.joint]
+        velocity = servo_velocity(drive, joint.position - joint.measured_position, joint.velocity)
+        plant.ctrl[one.place], drive.load = control(one, joint.position, velocity, drive.load)
     for g in range(plant.grippers.size):
         gripper, closure, closure_speed = plant.grippers[g], 0.0, 0.0
         for i in range(plant.inputs.size):
-            one = plant.inputs[i]
-            closure += one.per_length * (plant.lengths[one.actuator] - one.open_length)
-            closure_speed += one.per_length * plant.length_speeds[one.actuator]
+            finger = plant.inputs[i]
+            closure += finger.per_length * (plant.lengths[finger.actuator] - finger.open_length)
+            closure_speed += finger.per_length * plant.length_speeds[finger.actuator]
         advance_gripper(gripper, plant.samples, closing, step_s, closure, closure_speed)
         for i in range(plant.inputs.size):
-            one = plant.inputs[i]
-            plant.ctrl[one.place] = one.open + gripper.reference * (one.closed - one.open)
+            finger = plant.inputs[i]
+            plant.ctrl[finger.place] = finger.open + gripper.reference * (finger.closed - finger.open)
 
 
 @compiled(BUNDLE, FLOAT64, FLOAT64, output_array(1), output_array(1), output_array(1))

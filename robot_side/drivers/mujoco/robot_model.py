@@ -9,8 +9,9 @@ from scipy.spatial.transform import Rotation
 
 from common.arrays import BoolArray, FloatArray, IntArray
 from common.errors import ConfigurationError
+from robot_side.drivers.mujoco.actuators import find_drives, joint_name, moves_any
 from robot_side.drivers.mujoco.joint_drives import JointDrives
-from robot_side.drivers.mujoco.model_enums import BiasKind, GainKind, JointKind, TransmissionKind, WrappedKind
+from robot_side.drivers.mujoco.model_enums import JointKind
 
 SiteAxis = Literal["x", "-x", "y", "-y", "z", "-z"]
 
@@ -44,8 +45,6 @@ class RobotModel:
     lower_rad: FloatArray
     """(n,) lower ends of the joints' ranges, `upper_rad` the upper ends; infinite without a limit"""
     upper_rad: FloatArray
-    arm_controls: IntArray
-    """(n,) indices of the arm's actuators in ctrl"""
     drives: JointDrives
     finger_positions: IntArray
     """(f,) indices in qpos of the finger joints, which are those beyond the last arm joint"""
@@ -91,14 +90,13 @@ def find_robot(model: Any, site_name: str | None) -> RobotModel:
             " move, of " + ", ".join(_site_names(model))
         )
     _require_simple(model, joints)
-    actuators = np.array([_actuator_of(model, int(joint)) for joint in joints])
 
     last_link = int(model.jnt_bodyid[joints[-1]])
     beyond = [body for body in range(model.nbody) if body != last_link and last_link in _chain(model, body)]
     fingers = np.array([joint for body in beyond for joint in _joints(model, body)], dtype=np.int64)
     _require_simple(model, fingers)
     gripper_actuators = np.array(
-        [actuator for actuator in range(model.nu) if moves_any(model, actuator, fingers)], dtype=np.int64
+        [actuator for actuator in range(model.nactuator) if moves_any(model, actuator, fingers)], dtype=np.int64
     )
     geoms = _touching_geoms(model, beyond)
     if len(set(model.geom_bodyid[geoms].tolist())) < 2 and (geoms.size == 0 or fingers.size):
@@ -114,15 +112,7 @@ def find_robot(model: Any, site_name: str | None) -> RobotModel:
         arm_velocities=model.jnt_dofadr[joints].astype(np.int64),
         lower_rad=np.where(limited, model.jnt_range[joints, 0], -np.inf),
         upper_rad=np.where(limited, model.jnt_range[joints, 1], np.inf),
-        arm_controls=model.actuator_ctrladr[actuators].astype(np.int64),
-        drives=JointDrives(
-            gear=model.actuator_gear[actuators, 0].copy(),
-            gain=model.actuator_gainprm[actuators, 0].copy(),
-            offset=model.actuator_biasprm[actuators, 0].copy(),
-            stiffness=-model.actuator_biasprm[actuators, 1],
-            damping=-model.actuator_biasprm[actuators, 2],
-            strongest=_strongest(model, actuators),
-        ),
+        drives=find_drives(model, joints, fingers),
         finger_positions=model.jnt_qposadr[fingers].astype(np.int64),
         finger_velocities=model.jnt_dofadr[fingers].astype(np.int64),
         gripper_actuators=gripper_actuators,
@@ -150,12 +140,6 @@ def put_site(model: Any, site: int, place_m: FloatArray) -> None:
         model.site_pos[site] = place_m
         # MuJoCo takes the body's frame for a site that had the same one.
         model.site_sameframe[site] = 0
-
-
-def _strongest(model: Any, actuators: IntArray) -> FloatArray:
-    """Return the greatest torque or force (n,) of the `actuators` (n,) at their joints; infinite without a limit."""
-    most: FloatArray = np.abs(model.actuator_gear[actuators, 0]) * model.actuator_forcerange[actuators, 1]
-    return np.where(model.actuator_forcelimited[actuators].astype(bool), most, np.inf)
 
 
 def _fingerprint(model: Any, joints: IntArray, site: int) -> str:
@@ -219,52 +203,7 @@ def _require_simple(model: Any, joints: IntArray) -> None:
         if model.jnt_type[joint] not in _TURNING_OR_SLIDING:
             kind = JointKind(int(model.jnt_type[joint])).name.lower()
             why = "the robot's base must stand fixed" if kind == "free" else "no single motor moves such a joint"
-            raise ConfigurationError(f"model: {_joint_name(model, joint)} is {kind}: {why}; valid: hinge or slide")
-
-
-def _joint_name(model: Any, joint: int) -> str:
-    """Return a description of the joint by which a person can find it in the model."""
-    if name := model.joint(joint).name:
-        return f"joint {name!r}"
-    body = int(model.jnt_bodyid[joint])
-    return f"unnamed joint {joint} of body {model.body(body).name or str(body)!r}"
-
-
-def _why_no_actuator(model: Any, joint: int) -> str:
-    """Return the reason why a joint has no actuator of its own."""
-    if any(moves_any(model, actuator, np.array([joint])) for actuator in range(model.nu)):
-        return "it shares the tendon that pulls it with another joint"
-    if model.nmocap > 0:
-        return "the model is moved by a mocap body, which no real robot has"
-    return "nothing would hold or move it"
-
-
-def _actuator_of(model: Any, joint: int) -> int:
-    """Return the first actuator on `joint`; ConfigurationError if there is none, or if its kind is not supported."""
-    for actuator in range(model.nu):
-        on_joint = model.actuator_trntype[actuator] in (TransmissionKind.JOINT, TransmissionKind.JOINT_IN_PARENT)
-        if not on_joint or model.actuator_trnid[actuator, 0] != joint:
-            continue
-        # An actuator with an internal state between input and force, such as an integrator, is not supported.
-        simple = (
-            model.actuator_dyntype[actuator] == 0
-            and model.actuator_gaintype[actuator] == GainKind.FIXED
-            and model.actuator_biastype[actuator] in (BiasKind.NONE, BiasKind.AFFINE)
-            and model.actuator_ctrlnum[actuator] == 1
-            and model.actuator_gainprm[actuator, 0] != 0.0
-            and model.actuator_gear[actuator, 0] != 0.0
-            and (model.actuator_biasprm[actuator, 1:3] <= 0.0).all()
-        )
-        if not simple:
-            raise ConfigurationError(
-                f"model: the actuator {model.actuator(actuator).name or actuator!r} of {_joint_name(model, joint)} is"
-                " of an unsupported kind; valid: position, velocity, motor"
-            )
-        return actuator
-    raise ConfigurationError(
-        f"model: the arm's {_joint_name(model, joint)} has no actuator of its own: {_why_no_actuator(model, joint)};"
-        " valid: a position, velocity or motor actuator on each joint from the base to the site"
-    )
+            raise ConfigurationError(f"model: {joint_name(model, joint)} is {kind}: {why}; valid: hinge or slide")
 
 
 def machines(model: Any) -> set[int]:
@@ -272,21 +211,8 @@ def machines(model: Any) -> set[int]:
     return {
         int(model.body_rootid[model.jnt_bodyid[joint]])
         for joint in range(model.njnt)
-        if any(moves_any(model, actuator, np.array([joint])) for actuator in range(model.nu))
+        if any(moves_any(model, actuator, np.array([joint])) for actuator in range(model.nactuator))
     }
-
-
-def moves_any(model: Any, actuator: int, joints: IntArray) -> bool:
-    """Return whether an actuator moves one of `joints` (n,), directly or by a tendon."""
-    kind, target = int(model.actuator_trntype[actuator]), int(model.actuator_trnid[actuator, 0])
-    if kind in {TransmissionKind.JOINT, TransmissionKind.JOINT_IN_PARENT}:
-        return target in joints
-    if kind == TransmissionKind.TENDON:
-        first = int(model.tendon_adr[target])
-        wrapped = slice(first, first + int(model.tendon_num[target]))
-        is_joint = model.wrap_type[wrapped] == WrappedKind.JOINT
-        return bool(np.isin(model.wrap_objid[wrapped][is_joint], joints).any())
-    return False
 
 
 def _touching_geoms(model: Any, bodies: list[int]) -> IntArray:

@@ -8,9 +8,9 @@ import mujoco  # type: ignore[import-untyped]
 import numpy as np
 
 from common.roles import Role
+from robot_side.drivers.mujoco.actuators import moves_any
 from robot_side.drivers.mujoco.gripper_measurement import GripperTravel
 from robot_side.drivers.mujoco.model_enums import JointKind
-from robot_side.drivers.mujoco.robot_model import moves_any
 from robot_side.drivers.mujoco.scene import Scene
 
 _NEAR_END: Final = math.radians(2.0)
@@ -47,18 +47,15 @@ def joint_findings(scene: Scene, travel: GripperTravel | None) -> list[str]:
 
 def _dead(scene: Scene) -> list[str]:
     """Return the joints of position servos whose inputs do not cover the joints' ranges."""
-    model, robot, drives = scene.model, scene.robot, scene.robot.drives
+    robot, drives = scene.robot, scene.robot.drives
     names = []
-    for index, joint in enumerate(robot.arm_joints.tolist()):
-        actuator = next(
-            one for one in range(model.nu) if int(model.actuator_ctrladr[one]) == int(robot.arm_controls[index])
-        )
-        if drives.stiffness[index] <= 0.0 or not model.actuator_ctrllimited[actuator] or not model.jnt_limited[joint]:
-            continue
-        scale = drives.gain[index] / (drives.stiffness[index] * drives.gear[index])
-        low, high = sorted(scale * model.actuator_ctrlrange[actuator])
-        if low > robot.lower_rad[index] + _SAME or high < robot.upper_rad[index] - _SAME:
-            names.append(_name(model, joint))
+    for row in np.flatnonzero((drives.stiffness > 0.0) & (drives.gain != 0.0)).tolist():
+        joint = int(drives.joint[row])
+        lower, upper = float(robot.lower_rad[joint]), float(robot.upper_rad[joint])
+        scale = drives.gain[row] / (drives.stiffness[row] * drives.gear[row])
+        low, high = sorted((scale * drives.lowest[row], scale * drives.highest[row]))
+        if math.isfinite(upper - lower) and (low > lower + _SAME or high < upper - _SAME):
+            names.append(_name(scene.model, int(robot.arm_joints[joint])))
     return names
 
 
@@ -107,7 +104,7 @@ def _filled(scene: Scene) -> str:
 
 
 def _driven(model: Any, joint: int) -> bool:
-    return any(moves_any(model, actuator, np.array([joint])) for actuator in range(model.nu))
+    return any(moves_any(model, actuator, np.array([joint])) for actuator in range(model.nactuator))
 
 
 def _is_outside(scene: Scene, joint: int) -> bool:

@@ -15,6 +15,7 @@ from tests.helpers.arm_models import (
     COUPLING,
     MOTORS,
     POSITION_SERVOS,
+    SEVERAL,
     VELOCITY_SERVOS,
     planar_arm,
 )
@@ -172,7 +173,7 @@ def test_a_blocked_arm_winds_nothing_up(tmp_path: Path) -> None:
     assert arm.state(3.2).joint_positions_rad[0] < blocked[0] - 0.06
 
 
-@pytest.mark.parametrize("actuators", [POSITION_SERVOS, VELOCITY_SERVOS, MOTORS])
+@pytest.mark.parametrize("actuators", [POSITION_SERVOS, VELOCITY_SERVOS, MOTORS, *SEVERAL])
 def test_every_kind_of_actuator_holds_moves_and_stops_an_arm(tmp_path: Path, actuators: str) -> None:
     scene = load_scene(planar_arm(tmp_path, arm_actuators=actuators), "tcp")
     arm = perfect_arm(scene)
@@ -188,6 +189,16 @@ def test_every_kind_of_actuator_holds_moves_and_stops_an_arm(tmp_path: Path, act
     stopped = arm.state(2.5)
     assert np.abs(stopped.joint_velocities_rad_s).max() < 1e-3
     assert np.abs(stopped.joint_positions_rad - positions[-1]).max() < 0.4 * 0.05 + 0.4**2 / 12.0 + 5e-3
+
+
+def test_an_input_that_nothing_drives_rests(tmp_path: Path) -> None:
+    actuators = POSITION_SERVOS + '<damper name="brake" joint="elbow" kv="500" ctrlrange="0 1"/>'
+    home = '<keyframe><key name="home" qpos="0.4 -1 0 0" ctrl="0.4 -1 1 0"/></keyframe>'
+    scene = load_scene(planar_arm(tmp_path, arm_actuators=actuators, extra_bottom=COUPLING + home), "tcp")
+    arm = perfect_arm(scene)
+    arm.command(np.array([0.0, 0.5]), 1.0)
+    assert arm.state(0.0).time_s == 0.0
+    assert arm.state(0.5).joint_velocities_rad_s[1] == pytest.approx(0.5, rel=0.02)
 
 
 @pytest.mark.parametrize("kind", ["BADQPOS", "BADQVEL", "BADQACC", "CONTACTFULL", "BADCTRL"])
@@ -225,7 +236,8 @@ def test_it_grasps_and_lifts_the_target() -> None:
 def test_weak_servos_and_other_drives_may_lead_farther() -> None:
     stiffness, strongest = np.array([4000.0, 12.5, 50.0, 0.0]), np.array([150.0, 5.0, np.inf, 87.0])
     gear, nothing = np.array([1.0, 2.0, 1.0, 1.0]), np.zeros(4)
-    drives = JointDrives(gear, gain=nothing, offset=nothing, stiffness=stiffness, damping=nothing, strongest=strongest)
+    ends, order = np.full(4, np.inf), np.arange(4)
+    drives = JointDrives(gear, nothing, nothing, stiffness, nothing, strongest, -ends, ends, joint=order, place=order)
     # An eighth of 5 N m at 2² 12.5 N m/rad is 12.5 mrad.
     np.testing.assert_allclose(drives.windup_rad(0.005), [0.005, 0.0125, 0.02, 0.02])
     np.testing.assert_allclose(load_scene().robot.drives.windup_rad(0.005), 0.005)

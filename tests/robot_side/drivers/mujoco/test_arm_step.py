@@ -14,7 +14,7 @@ from robot_side.drivers.mujoco.encoders import Encoder
 from robot_side.drivers.mujoco.gripper_measurement import GripperTravel, measure_gripper
 from robot_side.drivers.mujoco.joint_reference import MotionLimits
 from robot_side.drivers.mujoco.scene import Scene, load_scene
-from tests.helpers.arm_models import MIRRORED_GRIPPER, MOTORS, POSITION_SERVOS, VELOCITY_SERVOS, planar_arm
+from tests.helpers.arm_models import MIRRORED_GRIPPER, MOTORS, POSITION_SERVOS, SEVERAL, VELOCITY_SERVOS, planar_arm
 
 LIMITS = MotionLimits(velocity_rad_s=1.0, windup_rad=0.01)
 STEPS = 3000
@@ -83,9 +83,12 @@ class PlainGripper:
 
 
 def plain_inputs(scene: Scene, reference: PlainReference) -> tuple[FloatArray, FloatArray]:
-    """Return the expected inputs (n,) and torques (n,) of the arm's actuators, computed in plain NumPy."""
+    """Return the expected inputs (n,), empty if a joint has several, and torques (n,), computed in plain NumPy."""
     data, robot, drives = scene.data, scene.robot, scene.robot.drives
-    dofs, motor = robot.arm_velocities, (drives.stiffness == 0.0) & (drives.damping == 0.0)
+    stiffness, damping = (
+        np.bincount(drives.joint, drives.gear**2 * values) for values in (drives.stiffness, drives.damping)
+    )
+    dofs, motor = robot.arm_velocities, (stiffness == 0.0) & (damping == 0.0)
     error = reference.position - data.qpos[robot.arm_positions]
     speed_error = reference.velocity - data.qvel[dofs]
     acceleration: FloatArray = np.zeros(scene.model.nv)
@@ -94,10 +97,11 @@ def plain_inputs(scene: Scene, reference: PlainReference) -> tuple[FloatArray, F
     mujoco.mj_mulM(scene.model, data, inertial, acceleration)
     load = (inertial + data.qfrc_bias - data.qfrc_gravcomp - data.qfrc_spring)[dofs]
     load = load + scene.model.dof_damping[dofs] * reference.velocity
-    ahead = np.where((drives.stiffness == 0.0) & ~motor, 20.0 * error, 0.0)
-    stiffness, damping = drives.gear**2 * drives.stiffness, drives.gear**2 * drives.damping
+    ahead = np.where((stiffness == 0.0) & ~motor, 20.0 * error, 0.0)
     # On its reference a joint feels the load's torque and nothing else.
     torque = load + stiffness * error + damping * (speed_error + ahead)
+    if len(drives.gear) > len(dofs):
+        return np.empty(0), torque
     length = drives.gear * data.qpos[robot.arm_positions]
     length_speed = drives.gear * data.qvel[dofs]
     held_back = drives.offset - drives.stiffness * length - drives.damping * length_speed
@@ -122,7 +126,13 @@ def sprung_motors_and_two_fingers(path: Path) -> Scene:
     return load_scene(model, "tcp")
 
 
-@pytest.mark.parametrize("load", [built_in, position_servos, velocity_servos, sprung_motors_and_two_fingers])
+def four_on_a_joint(path: Path) -> Scene:
+    return load_scene(planar_arm(path, arm_actuators=SEVERAL[0] + SEVERAL[3]), "tcp")
+
+
+@pytest.mark.parametrize(
+    "load", [built_in, position_servos, velocity_servos, sprung_motors_and_two_fingers, four_on_a_joint]
+)
 def test_every_step_is_what_plain_formulas_say(tmp_path: Path, load: Callable[[Path], Scene]) -> None:
     scene = load(tmp_path)
     data, robot = scene.data, scene.robot
@@ -164,10 +174,11 @@ def test_every_step_is_what_plain_formulas_say(tmp_path: Path, load: Callable[[P
             lengths, speeds = data.actuator_length[of].copy(), data.actuator_velocity[of].copy()
             gripper.advance(closing if now_s < closing_ends_s else 0.0, step_s, lengths, speeds)
         state = arm.state(now_s + step_s)
-        np.testing.assert_allclose(data.ctrl[robot.arm_controls], control, rtol=1e-12, atol=1e-12)
+        if len(control):
+            np.testing.assert_allclose(data.ctrl[robot.drives.place], control, rtol=1e-12, atol=1e-12)
         np.testing.assert_array_equal(state.joint_positions_rad, data.qpos[robot.arm_positions])
         np.testing.assert_array_equal(state.joint_velocities_rad_s, data.qvel[robot.arm_velocities])
-        strong = np.abs(torque) < robot.drives.strongest
+        strong = np.abs(torque) < np.bincount(robot.drives.joint, robot.drives.strongest)
         given = data.qfrc_actuator[robot.arm_velocities]
         np.testing.assert_allclose(given[strong], torque[strong], rtol=1e-9, atol=1e-9)
         if gripper is not None:

@@ -24,6 +24,7 @@ def test_the_numbers_of_the_kinds_are_mujocos() -> None:
         model_enums.WrappedKind: (mujoco.mjtWrap, "mjWRAP_"),
         model_enums.GainKind: (mujoco.mjtGain, "mjGAIN_"),
         model_enums.BiasKind: (mujoco.mjtBias, "mjBIAS_"),
+        model_enums.DynamicsKind: (mujoco.mjtDyn, "mjDYN_"),
     }
     for kinds, (theirs, prefix) in names.items():
         for kind in kinds:
@@ -211,6 +212,11 @@ NO_BASE = """<mujoco><worldbody>{more}<body name="arm">{joint}<geom size="0.1"/>
 <actuator><motor joint="other"/></actuator></mujoco>"""
 BALL_JOINT = '<body pos="0.3 0 0"><joint name="b" type="ball"/><geom size="0.01"/><site name="end"/></body>'
 MUSCLE = POSITION_SERVOS.split("/>")[0] + '/><muscle name="pull" joint="elbow" lengthrange="0 1"/>'
+STRING = (
+    '<tendon><fixed name="string"><joint joint="shoulder" coef="1"/><joint joint="elbow" coef="1"/></fixed></tendon>'
+)
+STRINGS = '<position name="winch" tendon="string" kp="10"/>'
+OFF = POSITION_SERVOS.replace('joint="elbow"', 'group="3" joint="elbow"')
 KEY = '<keyframe><key name="home" qpos="{} 0 0 0" qvel="0 0 0 {}"/></keyframe>'
 # Enough memory to compile it, too little for its contacts.
 HEAP = "".join(f'<body pos="1 {0.01 * ball} 2"><freejoint/><geom size="0.05"/></body>' for ball in range(40))
@@ -222,6 +228,21 @@ REFUSED: list[tuple[dict[str, str] | str, str | None, str]] = [
     ({"arm_actuators": "", "gripper_actuators": ""}, "tcp", "no actuators"),
     ({"arm_actuators": MOTORS.split("/>")[0] + "/>"}, "tcp", "arm's joint 'elbow' has no actuator of its own: nothing"),
     ({"arm_actuators": MUSCLE}, "tcp", "'pull' of joint 'elbow' is of an unsupported kind; valid: position"),
+    (
+        {"arm_actuators": POSITION_SERVOS + MUSCLE[-55:]},
+        "tcp",
+        "'pull' of joint 'elbow' is of an unsupported kind, beside",
+    ),
+    (
+        {"arm_actuators": POSITION_SERVOS + STRINGS, "extra_bottom": STRING},
+        "tcp",
+        "acts by a tendon on a joint that the actuator 'shoulder' drives",
+    ),
+    (
+        {"arm_actuators": OFF, "extra_top": '<option actuatorgroupdisable="3"/>'},
+        "tcp",
+        "'elbow' has no actuator of its own: the model disables",
+    ),
     ({"world": '<site name="corner"/>'}, "corner", "no joint moves 'corner'"),
     (
         {"world": '<body mocap="true"><geom size="1"/><site name="grip"/></body>'},
