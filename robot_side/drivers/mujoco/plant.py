@@ -7,9 +7,9 @@ import numpy as np
 from common.arrays import FloatArray, IntArray
 from robot_side.compiled.columns import BUNDLE, INDICES, NUMBERS, Declared, records, rows
 from robot_side.compiled.kernel import BOOL, FLOAT64, compiled, output_array
+from robot_side.drivers.mujoco.drives.joint_drives import DRIVE, INPUT, control, motor_acceleration, servo_velocity
 from robot_side.drivers.mujoco.encoders import reading
 from robot_side.drivers.mujoco.gripper_drive import GRIPPER, GRIPPER_INPUT, advance_gripper
-from robot_side.drivers.mujoco.joint_drives import DRIVE, INPUT, control, motor_acceleration, servo_velocity
 from robot_side.drivers.mujoco.joint_reference import REFERENCE, advance_references
 
 INERTIA: Final = np.dtype([("place", np.int64), ("row", np.int64), ("column", np.int64)])

@@ -9,8 +9,8 @@ from scipy.spatial.transform import Rotation
 
 from common.arrays import BoolArray, FloatArray, IntArray
 from common.errors import ConfigurationError
-from robot_side.drivers.mujoco.actuators import find_drives, joint_name, moves_any
-from robot_side.drivers.mujoco.joint_drives import JointDrives
+from robot_side.drivers.mujoco.drives.actuators import find_drives, joint_name, moves_any
+from robot_side.drivers.mujoco.drives.joint_drives import JointDrives
 from robot_side.drivers.mujoco.model_enums import JointKind
 
 SiteAxis = Literal["x", "-x", "y", "-y", "z", "-z"]

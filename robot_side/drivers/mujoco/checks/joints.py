@@ -8,7 +8,7 @@ import mujoco  # type: ignore[import-untyped]
 import numpy as np
 
 from common.roles import Role
-from robot_side.drivers.mujoco.actuators import moves_any
+from robot_side.drivers.mujoco.drives.actuators import moves_any
 from robot_side.drivers.mujoco.gripper_measurement import GripperTravel
 from robot_side.drivers.mujoco.model_enums import JointKind
 from robot_side.drivers.mujoco.scene import Scene

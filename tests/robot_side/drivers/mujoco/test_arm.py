@@ -6,9 +6,9 @@ import pytest
 
 from common.errors import FeelaheadError
 from robot_side.drivers.mujoco.arm import LONGEST_TURN_S, MujocoArm
+from robot_side.drivers.mujoco.drives.joint_drives import JointDrives
 from robot_side.drivers.mujoco.encoders import Encoder
 from robot_side.drivers.mujoco.ground_truth import GroundTruth
-from robot_side.drivers.mujoco.joint_drives import JointDrives
 from robot_side.drivers.mujoco.joint_reference import MotionLimits
 from robot_side.drivers.mujoco.scene import Scene, load_scene
 from tests.helpers.arm_models import (

@@ -6,7 +6,7 @@ import numpy as np
 
 from common.arrays import IntArray
 from common.errors import ConfigurationError
-from robot_side.drivers.mujoco.joint_drives import JointDrives
+from robot_side.drivers.mujoco.drives.joint_drives import JointDrives
 from robot_side.drivers.mujoco.model_enums import BiasKind, DynamicsKind, GainKind, TransmissionKind, WrappedKind
 
 _ON_JOINT: Final = (TransmissionKind.JOINT, TransmissionKind.JOINT_IN_PARENT)
