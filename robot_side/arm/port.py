@@ -29,6 +29,8 @@ class ArmState:
     joint_loads_nm: FloatArray | None = None
     """(n,) torques of the drives beyond those that move and hold the arm itself: from the weight of what the arm
     carries, less what supports it. N for a prismatic joint. None from an arm that does not measure them."""
+    simulated_s: float | None = None
+    """Simulated time, which slow physics lets fall behind `time_s`; None if nothing is simulated"""
 
 
 class Arm(Protocol):

@@ -23,6 +23,7 @@ _LONGEST_ADVANCE_S = 2.0
 LONGEST_TURN_S: Final = 0.02
 """Longest time, in seconds, for which slow physics may delay messages, stops and leases"""
 _LIMIT_MARGIN_RAD = 0.005
+_NO_CONTACT = int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
 # Bad positions, velocities and accelerations, which are neighbours among MuJoCo's warnings.
 _UNSTABLE = slice(int(mujoco.mjtWarning.mjWARN_BADQPOS), int(mujoco.mjtWarning.mjWARN_BADQACC) + 1)
 
@@ -80,8 +81,9 @@ class MujocoArm:
         self._gripper = None if travel is None else GripperDrive(travel, gripper_stroke_time_s)
         start = data.qpos[robot.arm_positions].copy()
         limits = limits or MotionLimits()
-        windup_rad = robot.drives.windup_rad(limits.windup_rad, model.dof_frictionloss[robot.arm_velocities])
-        self._reference = JointReference(start, *self.ends_rad, limits, windup_rad)
+        friction, dry = (values[robot.arm_velocities] for values in (model.dof_damping, model.dof_frictionloss))
+        windup_rad = robot.drives.windup_rad(limits.windup_rad, dry)
+        self._reference = JointReference(start, *self.ends_rad, limits, windup_rad, robot.drives.yield_rad())
         mujoco.mj_forward(model, data)
         of_arm = [actuator for actuator in range(model.nactuator) if moves_any(model, actuator, robot.arm_joints)]
         hold_idle(model, data, np.union1d(of_arm, robot.gripper_actuators).astype(np.int64))
@@ -93,7 +95,7 @@ class MujocoArm:
         gripper, driven = self._gripper, robot.gripper_actuators
         self._plant = Plant(
             self._reference.joints,
-            robot.drives.table(model.dof_damping[robot.arm_velocities]),
+            robot.drives.table(friction, dry),
             robot.drives.inputs(),
             inertia_table(model, robot.arm_velocities),
             np.zeros(0, GRIPPER) if gripper is None else gripper.drive,
@@ -152,6 +154,23 @@ class MujocoArm:
         if self._gripper is not None:
             self._gripper.command(0.0, self._time_s)
         self._state = None
+
+    def rehearse(self, joint_velocity_rad_s: FloatArray, duration_s: float) -> FloatArray:
+        """Command `joint_velocity_rad_s` (n,) for `duration_s` in empty space, and put all back.
+
+        Return the true joint positions (k, n) after each step. Only before the first `state`.
+        """
+        model, data = self._model, self._data
+        flags, model.opt.disableflags = model.opt.disableflags, model.opt.disableflags | _NO_CONTACT
+        self._reference.command(joint_velocity_rad_s, duration_s)
+        path: list[FloatArray] = []
+        for _ in range(round(duration_s / self._step_s)):
+            self._advance_one_step()
+            path.append(data.qpos[self._robot.arm_positions])
+        model.opt.disableflags, self._steps = flags, 0
+        self.put_back()
+        data.time = self._start.time
+        return np.array(path)
 
     def give_way(self, clock: Clock) -> None:
         """Limit each later call of `state` to LONGEST_TURN_S and one step, by `clock`.
@@ -228,6 +247,7 @@ class MujocoArm:
             gripper_opening_m=0.0 if gripper is None else gripper.opening_m,
             gripper_holding=gripper is not None and gripper.holding,
             joint_loads_nm=self._loads_nm(),
+            simulated_s=self._steps * self._step_s,
         )
 
     def _loads_nm(self) -> FloatArray:

@@ -23,12 +23,14 @@ REFERENCE: Final = np.dtype(
         ("lower", np.float64),
         ("upper", np.float64),
         ("windup", np.float64),
+        ("yields", np.float64),
         ("to_lower", np.float64),
         ("to_upper", np.float64),
         ("change", np.float64),
     ]
 )
-"""Record of a joint's reference, in rad and s. lower, upper: ends of its range. to_lower, to_upper: velocities from
+"""Record of a joint's reference, in rad and s. lower, upper: ends of its range. windup: as for `JointReference`;
+yields: its yield_rad. to_lower, to_upper: velocities from
 which the joint can still stop at these ends. change: target velocity minus present velocity."""
 
 _Limit = Annotated[float, Meta(gt=0.0)]
@@ -70,10 +72,12 @@ class JointReference:
         upper_rad: FloatArray,
         limits: MotionLimits,
         windup_rad: FloatArray | None = None,
+        yield_rad: FloatArray | None = None,
     ) -> None:
         """Begin at `position_rad` (n,), between the ends lower_rad and upper_rad (n,), which may be infinite.
 
-        windup_rad (n,): largest lead of each joint; None: the value of `limits` for all.
+        windup_rad (n,): largest lead of each joint; None: the value of `limits` for all. yield_rad (n,): deviation
+        beyond which a joint that is pushed away takes its reference along, as it would spring back; None: never.
         """
         self.joints: np.ndarray = np.zeros(position_rad.shape, REFERENCE)
         """(n,) records of REFERENCE"""
@@ -82,6 +86,7 @@ class JointReference:
             ("lower", lower_rad),
             ("upper", upper_rad),
             ("windup", limits.windup_rad if windup_rad is None else windup_rad),
+            ("yields", np.inf if yield_rad is None else yield_rad),
         ):
             self.joints[name] = values
         self.limits = limits
@@ -163,6 +168,7 @@ def advance_references(
         moved = min(max(joint.position + way, joint.lower), joint.upper)
         # A lead caused by a load stays: a reference that followed the joint back would let it sink.
         lead = joint.windup + abs(way)
-        most_behind = min(joint.position, joint.measured_position - lead)
-        most_ahead = max(joint.position, joint.measured_position + lead)
+        most = max(lead, joint.yields)
+        most_behind = max(min(joint.position, joint.measured_position - lead), joint.measured_position - most)
+        most_ahead = min(max(joint.position, joint.measured_position + lead), joint.measured_position + most)
         joint.position = min(max(moved, most_behind), most_ahead)

@@ -7,7 +7,14 @@ import numpy as np
 from common.arrays import FloatArray, IntArray
 from robot_side.compiled.columns import BUNDLE, INDICES, NUMBERS, Declared, records, rows
 from robot_side.compiled.kernel import BOOL, FLOAT64, compiled, output_array
-from robot_side.drivers.mujoco.drives.joint_drives import DRIVE, INPUT, control, motor_acceleration, servo_velocity
+from robot_side.drivers.mujoco.drives.joint_drives import (
+    DRIVE,
+    INPUT,
+    control,
+    friction_torque,
+    motor_acceleration,
+    servo_velocity,
+)
 from robot_side.drivers.mujoco.encoders import reading
 from robot_side.drivers.mujoco.gripper_drive import GRIPPER, GRIPPER_INPUT, advance_gripper
 from robot_side.drivers.mujoco.joint_reference import REFERENCE, advance_references
@@ -102,7 +109,7 @@ def drive(bundle: IntArray, following: bool, ended: bool, closing: float, step_s
         velocity_error = joint.velocity - joint.measured_velocity
         drive.acceleration = joint.acceleration + motor_acceleration(drive, position_error, velocity_error)
         forces = plant.bias[place] - plant.compensated[place] - plant.sprung[place]
-        drive.load = forces + drive.friction * joint.velocity
+        drive.load = forces + friction_torque(drive, joint.velocity, position_error)
     for k in range(inertia.size):
         row, column = inertia[k].row, inertia[k].column
         element = plant.mass[inertia[k].place]

@@ -11,11 +11,12 @@ from robot_side.compiled.kernel import inlined
 from robot_side.drivers.mujoco.model_enums import BiasKind, JointKind, TransmissionKind
 
 DRIVE: Final = np.dtype(
-    [(name, np.float64) for name in ("stiffness", "damping", "friction", "acceleration", "load")],
+    [(name, np.float64) for name in ("stiffness", "damping", "friction", "dry", "acceleration", "load")],
 )
 """Record of a joint's drive, by all of its actuators together. stiffness, damping: torque for each rad, and for each
-rad/s. friction: damping of the joint itself, N m s/rad. acceleration: commanded acceleration, rad/s². load: torque that
-this acceleration, friction and gravity need, N m, less what actuators already give."""
+rad/s. friction: damping of the joint itself, N m s/rad. dry: dry friction of a joint with motors only, N m.
+acceleration: commanded acceleration, rad/s². load: torque that this acceleration, friction and gravity need, N m, less
+what actuators already give."""
 _MODELLED: Final = ("gear", "gain", "offset", "stiffness", "damping", "lowest", "highest")
 INPUT: Final = np.dtype(
     [*((name, np.int64) for name in ("joint", "place")), *((name, np.float64) for name in (*_MODELLED, "share"))]
@@ -27,6 +28,8 @@ before it have left of the load; 1 for the last and strongest."""
 _MOTOR_BANDWIDTH_RAD_S = 50.0
 _VELOCITY_SERVO_BANDWIDTH_RAD_S = 20.0
 _MOST_WINDUP_RAD = 0.02
+_DRY_LEAD_RAD = 0.01
+"""Lead over a joint from which its motor is given all the torque against dry friction"""
 _MOST_STUCK_RAD = 0.3
 _IDLE_BANDWIDTH_RAD_S = 30.0
 """Bandwidth of the servos that hold idle joints driven by motors."""
@@ -41,6 +44,17 @@ def motor_acceleration(drive: Any, position_error: float, velocity_error: float)
     if drive.stiffness != 0.0 or drive.damping != 0.0:
         return 0.0
     return _MOTOR_BANDWIDTH_RAD_S**2 * position_error + 2.0 * _MOTOR_BANDWIDTH_RAD_S * velocity_error
+
+
+@inlined
+def friction_torque(drive: Any, velocity: float, position_error: float) -> float:
+    """Return the torque against the joint's own friction at the reference's `velocity`, N m.
+
+    position_error: reference minus measurement; all of the dry friction is overcome once the joint is behind.
+    """
+    dry = drive.dry * min(max(position_error / _DRY_LEAD_RAD, -1.0), 1.0)
+    torque: float = drive.friction * velocity + dry
+    return torque
 
 
 @inlined
@@ -104,12 +118,22 @@ class JointDrives:
         windup_rad: FloatArray = np.maximum(usual, np.minimum(sticks, _MOST_STUCK_RAD))
         return windup_rad
 
-    def table(self, friction: FloatArray) -> np.ndarray:
-        """Return records (n,) of DRIVE. friction (n,): damping of each joint itself, N m s/rad."""
+    def yield_rad(self) -> FloatArray:
+        """Return the deviations (n,) of joints from their references at which their servos are at their strongest.
+
+        Infinite without a limit in the model, and without stiffness.
+        """
+        stiffness, strongest = self._of_joints(self.gear**2 * self.stiffness), self._of_joints(self.strongest)
+        return np.divide(strongest, stiffness, out=np.full_like(stiffness, np.inf), where=stiffness > 0.0)
+
+    def table(self, friction: FloatArray, dry_friction_nm: FloatArray | float = 0.0) -> np.ndarray:
+        """Return records (n,) of DRIVE. friction (n,), dry_friction_nm (n,): damping and dry friction of the joints."""
         drives = np.zeros(friction.shape, DRIVE)
         drives["stiffness"] = self._of_joints(self.gear**2 * self.stiffness)
         drives["damping"] = self._of_joints(self.gear**2 * self.damping)
         drives["friction"] = friction
+        # A servo overcomes dry friction by its stiffness (`windup_rad`).
+        drives["dry"] = np.where((drives["stiffness"] == 0.0) & (drives["damping"] == 0.0), dry_friction_nm, 0.0)
         return drives
 
     def inputs(self) -> np.ndarray:

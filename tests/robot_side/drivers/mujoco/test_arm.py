@@ -191,6 +191,35 @@ def test_every_kind_of_actuator_holds_moves_and_stops_an_arm(tmp_path: Path, act
     assert np.abs(stopped.joint_positions_rad - positions[-1]).max() < 0.4 * 0.05 + 0.4**2 / 12.0 + 5e-3
 
 
+def test_motors_overcome_dry_friction(tmp_path: Path) -> None:
+    model = planar_arm(tmp_path, arm_actuators=MOTORS)
+    model.write_text(model.read_text().replace('armature="0.1"', 'armature="0.001" frictionloss="40"'))
+    arm = perfect_arm(load_scene(model, "tcp"))
+    arm.state(0.0)
+    velocity = np.array([0.3, -0.4])
+    arm.command(velocity, 1.0)
+    first, last = (arm.state(time_s).joint_positions_rad for time_s in (0.4, 0.8))
+    np.testing.assert_allclose((last - first) / 0.4, velocity, rtol=0.05)
+
+
+def test_a_joint_that_was_pushed_away_does_not_spring_back(tmp_path: Path) -> None:
+    scene = load_scene(
+        planar_arm(tmp_path, arm_actuators=POSITION_SERVOS.replace("kp", 'forcerange="-60 60" kp')), "tcp"
+    )
+    arm = perfect_arm(scene)
+    start, pushed = arm.state(0.0).joint_positions_rad, scene.data.qfrc_applied[:1]
+    fastest = 0.0
+    for tick in range(1500):
+        arm.command(np.array([0.2, 0.0]), tick * 1e-3 + 0.05)
+        pushed[:] = -120.0 if 200 < tick < 500 else 0.0
+        state = arm.state(tick * 1e-3)
+        if tick == 500:
+            assert state.joint_positions_rad[0] < start[0] - 0.3
+        if tick > 700:
+            fastest = max(fastest, float(state.joint_velocities_rad_s[0]))
+    assert fastest < 0.5
+
+
 def test_an_input_that_nothing_drives_rests(tmp_path: Path) -> None:
     actuators = POSITION_SERVOS + '<damper name="brake" joint="elbow" kv="500" ctrlrange="0 1"/>'
     home = '<keyframe><key name="home" qpos="0.4 -1 0 0" ctrl="0.4 -1 1 0"/></keyframe>'

@@ -24,8 +24,10 @@ SPRING = '<joint name="elbow" stiffness="3" springref="-40"'
 class PlainReference:
     """Reference motion of the arm's joints, computed in plain NumPy."""
 
-    def __init__(self, position: FloatArray, ends: tuple[FloatArray, FloatArray], windup: FloatArray) -> None:
-        self.position, (self.lower, self.upper), self.windup = position, ends, windup
+    def __init__(
+        self, position: FloatArray, ends: tuple[FloatArray, FloatArray], windup: FloatArray, yields: FloatArray
+    ) -> None:
+        self.position, (self.lower, self.upper), self.windup, self.yields = position, ends, windup, yields
         self.velocity, self.acceleration, self.command = (np.zeros_like(position) for _ in range(3))
         self.followed = False
 
@@ -46,11 +48,13 @@ class PlainReference:
         velocity = np.clip(self.velocity + change, slowest, fastest)
         self.acceleration, self.velocity = (velocity - self.velocity) / step_s, velocity
         lead = self.windup + np.abs(velocity * step_s)
-        self.position = np.clip(
+        near = np.clip(
             np.clip(self.position + velocity * step_s, self.lower, self.upper),
             np.minimum(self.position, measured - lead),
             np.maximum(self.position, measured + lead),
         )
+        most = np.maximum(self.yields, lead)
+        self.position = np.clip(near, measured - most, measured + most)
 
 
 class PlainGripper:
@@ -142,7 +146,7 @@ def test_every_step_is_what_plain_formulas_say(tmp_path: Path, load: Callable[[P
     gripper = None if travel is None else PlainGripper(travel)
     start = data.qpos[robot.arm_positions]
     windup_rad = robot.drives.windup_rad(LIMITS.windup_rad)
-    reference = PlainReference(start, arm.ends_rad, windup_rad)
+    reference = PlainReference(start, arm.ends_rad, windup_rad, robot.drives.yield_rad())
     random = np.random.default_rng(1)
     arm.state(0.0)
     ends_s, closing_ends_s, closing, followed, ran_out = -1.0, -1.0, 0.0, 0, 0
