@@ -11,12 +11,14 @@ from dataclasses import dataclass
 from typing import Any
 
 import msgspec
+import numpy as np
 
 from common.arrays import FloatArray
 from common.status.codes import LinkState
 from common.status.statuses import RobotStatus
 from common.timing.ages import LoopAge
 from robot_side.arm.ability import JointLimits
+from robot_side.arm.following import Following
 from robot_side.arm.joint_estimate import JointEstimate, lateness_s
 from robot_side.arm.port import Arm, ArmState, GripperKinematics
 from robot_side.arm.stick_frames import StickFrames
@@ -25,7 +27,7 @@ from robot_side.events import Found, Listener, Listeners, Tick
 from robot_side.gripper.grip import Grip
 from robot_side.gripper.held_covers import HeldCovers
 from robot_side.gripper.perceived_distances import perceived_distances
-from robot_side.homing import Homing
+from robot_side.homing import CLEAR_M, Homing
 from robot_side.laws.law import Law, Situation
 from robot_side.laws.sensed import Sensed
 from robot_side.motion import Motion
@@ -34,6 +36,7 @@ from robot_side.outcome.figures import Observer, RunFigures
 from robot_side.outcome.placing import scaled
 from robot_side.reporting.outgoing_messages import SHOWN_NAME, Outgoing
 from robot_side.reporting.reports import Reports
+from robot_side.surroundings.distances import object_distances
 from robot_side.surroundings.perceived import ObjectSource
 from robot_side.surroundings.surroundings import Sight, Surroundings
 
@@ -54,6 +57,10 @@ class RobotParts:
     loop_age: LoopAge
     limits: JointLimits
     motion: ToolMotionSettings
+    following: Following | None = None
+    """Judge of the arm's motion; None: one that tells joints by their numbers"""
+    misplaced_m: float = 0.01
+    """Distance by which things may be nearer than they are perceived, by the errors of camera and arm"""
     home_rad: FloatArray | None = None
     """(n,) joint positions of the start pose; None: there is no way home"""
     frames: StickFrames | None = None
@@ -78,7 +85,7 @@ class RobotSide:
         self.parts, self.session = parts, parts.session
         self.sight = Sight(parts.camera, parts.surroundings)
         self.grip = Grip(parts.surroundings, parts.held_covers)
-        self.motion = Motion(parts.arm, parts.limits, parts.motion, assists=parts.assists)
+        self.motion = Motion(parts.arm, parts.limits, parts.motion, parts.following, assists=parts.assists)
         home = parts.kinematics, parts.surroundings
         self.homing = None if parts.home_rad is None else Homing(parts.home_rad, parts.limits, *home)
         self.reports = Reports(parts.session, parts.law, parts.frames, full_rate=parts.full_rate)
@@ -106,6 +113,7 @@ class RobotSide:
         for mark in self.session.episodes.take_accepted():
             if mark == "reset":
                 self.grip.let_go()
+                self.motion.following.restart()
                 self.sight.see(now_s)
             self._heard.on_episode(mark, now_s)
 
@@ -129,6 +137,8 @@ class RobotSide:
         self._measured = parts.arm.state(now_s)
         begin("pose")
         late_s = lateness_s(self._measured, now_s)
+        following = self.motion.following
+        following.update(self.motion.commanded_rad_s, self._measured, late_s, self._touches)
         delay_s = self._follow_operator(now_s, late_s)
         self._joints.update(self._measured)
         state = self._joints.carried(late_s)
@@ -159,6 +169,7 @@ class RobotSide:
             gap_m=state.gripper_opening_m if parts.kinematics.has_fingers else None,
             held=grip.index,
             lateral=(0.0, 0.0) if command is None else command.lateral,
+            astray_m_s=following.tool_error_m_s(pose),
         )
         sensed = parts.law.sense(situation, now_s)
         self.newest = sensed, situation
@@ -178,6 +189,7 @@ class RobotSide:
         session, loop_age = self.session, self.parts.loop_age
         session.update(now_s)
         session.safety.arm_measured(late_s, now_s)
+        session.safety.arm_followed(self.motion.following.stop, now_s)
         if session.take_owner_changed():
             loop_age.reset()
             self.reports.begin_epoch()
@@ -185,6 +197,16 @@ class RobotSide:
             return loop_age.value(now_s)
         # In every tick, so that a link that falls silent ages, too (eq. 8).
         return loop_age.update(age_s + late_s, now_s)
+
+    def _touches(self) -> bool:
+        """Return whether the gripper, or what it holds, may touch something, as far as errors allow."""
+        if self.newest is None:
+            return False
+        situation = self.newest[1]
+        pose, scene = situation.pose, self.parts.surroundings.see(situation.objects)
+        reach_m = CLEAR_M + self.parts.misplaced_m
+        near = np.isfinite(object_distances(pose.sphere_centers_m, pose.sphere_radii_m, scene, reach_m))
+        return any(index != self.grip.index for index in np.flatnonzero(near).tolist())
 
     def observe(self, now_s: float) -> list[Outgoing]:
         """Return telemetry, read the camera's newest frame, and let listeners work.
@@ -254,6 +276,7 @@ class RobotSide:
                 "rejected": self.session.rejected,
                 "stale": self.session.stale,
             },
+            "following": self.motion.following.summary(),
             "lease": self.session.summary(),
             "episodes": self.session.episodes.summary(),
             "delay_ms": {"to_robot": self.session.link.delay.summary_ms()},

@@ -23,8 +23,8 @@ from robot_side.surroundings.distances import object_distances
 from robot_side.surroundings.perceived import PerceivedObjects
 from robot_side.surroundings.surroundings import Surroundings
 
-_CLEAR_M: Final = 0.01
-"""Distance that must stay free beyond the enlargement at rest"""
+CLEAR_M: Final = 0.01
+"""Distance beyond the enlargement within which something may be touched"""
 _STEP_RAD: Final = 0.04
 """Largest motion of a joint between two places that are looked at"""
 _AGAIN_TICKS: Final = 5
@@ -85,7 +85,7 @@ class Homing:
         if math.isnan(self._clear_m):
             if not still:
                 return np.zeros(self._home_rad.size)
-            self._clear_m = _CLEAR_M + enlargement_m
+            self._clear_m = CLEAR_M + enlargement_m
             self._note_near(state, grip, objects)
         self._look(state, grip, objects)
         if self._refused is not None:

@@ -5,6 +5,7 @@ import numpy as np
 from common.arrays import FloatArray
 from robot_side.arm.ability import JointLimits
 from robot_side.arm.commanded import commanded
+from robot_side.arm.following import Following
 from robot_side.arm.hindrance import Hindrance
 from robot_side.arm.port import Arm, ArmState, GripperPose
 from robot_side.arm.speed_assist import assisted
@@ -17,13 +18,22 @@ from robot_side.operators.safety import Permission
 class Motion:
     """Commander of the arm, which keeps the last command."""
 
-    def __init__(self, arm: Arm, limits: JointLimits, settings: ToolMotionSettings, *, assists: bool = False) -> None:
-        """assists: limit the speed along the triggers (see `speed_assist`)."""
+    def __init__(
+        self,
+        arm: Arm,
+        limits: JointLimits,
+        settings: ToolMotionSettings,
+        following: Following | None = None,
+        *,
+        assists: bool = False,
+    ) -> None:
+        """following: judge of the arm's motion; a new one by default. assists: limit the speed along the triggers."""
         self.commanded_rad_s: FloatArray | None = None
         """(n,) commanded joint velocities; None: the arm is to stand still"""
         self.told_m_s = self.rises_m_s = 0.0
         """Commanded speeds of the tool: in the direction in which R2 advances; and upwards (0 if nothing is held)"""
         self.hindrance = Hindrance()
+        self.following = following or Following(limits)
         self._arm, self._limits, self._settings, self._assists = arm, limits, settings, assists
         self._still: FloatArray = np.zeros(arm.joint_count)
 
@@ -45,7 +55,7 @@ class Motion:
         if command is None or grip.touchdown.gives_way:
             self.commanded_rad_s, self.told_m_s, self.rises_m_s = None, 0.0, 0.0
             if command is None:
-                self.hindrance.end()
+                self.hindrance.end(self.following.text)
             # Valid until the state's time: expiry between two physics steps would let a load sink, each time.
             self._arm.command(self._still, state.time_s)
             self._arm.command_gripper(0.0, now_s)
@@ -63,6 +73,8 @@ class Motion:
         else:
             velocity, self.told_m_s = homeward, float(pose.tool_rotation[:, 2] @ pose.tool_jacobian[:3] @ homeward)
             self.hindrance.end()
+        if self.following.text is not None:
+            self.hindrance.find(self.following.text)
         self.commanded_rad_s = velocity
         self.rises_m_s = 0.0 if grip.held is None else float(pose.tool_jacobian[2] @ velocity)
         self._arm.command(velocity, permission.valid_until_s)

@@ -11,11 +11,13 @@ from common.errors import ConfigurationError
 from common.protocol.link_end import LinkEnd
 from common.roles import Role
 from common.timing.ages import LoopAge
+from robot_side.arm.following import Following
 from robot_side.compiled.kernel import Compiled, imported_kernels
 from robot_side.core import RobotParts
 from robot_side.drivers.mujoco.arm import MujocoArm, stand
 from robot_side.drivers.mujoco.camera import CameraError, MujocoCamera
 from robot_side.drivers.mujoco.checks.cost import cost_findings
+from robot_side.drivers.mujoco.checks.following import following_findings
 from robot_side.drivers.mujoco.checks.joints import joint_findings
 from robot_side.drivers.mujoco.checks.reach import reach_findings, target_findings
 from robot_side.drivers.mujoco.checks.site_axis import site_findings
@@ -26,6 +28,7 @@ from robot_side.drivers.mujoco.gripper_measurement import GripperTravel
 from robot_side.drivers.mujoco.ground_truth import GroundTruth
 from robot_side.drivers.mujoco.joint_reference import MotionLimits
 from robot_side.drivers.mujoco.kinematics import MujocoKinematics
+from robot_side.drivers.mujoco.robot_model import joint_names
 from robot_side.drivers.mujoco.scene import Scene, load_scene
 from robot_side.drivers.mujoco.true_contact import TrueContact
 from robot_side.drivers.remote.arm import RemoteArm
@@ -118,6 +121,8 @@ def build_parts(
     limits = MotionLimits()
     arm, ends_rad, travel = _arm(scene, encoder, limits, beside)
     notes = _notes(scene, settings, travel)
+    if settings.model is not None and isinstance(arm, MujocoArm):
+        notes += tuple(following_findings(scene, arm, limits))
     say = announce or (lambda _: None)
     for text in notes:
         say(text)
@@ -131,8 +136,9 @@ def build_parts(
     joint_limits = limits.of_joints(arm.joint_count, *ends_rad)
     surroundings = Surroundings()
     prediction, prediction_note = _prediction_errors(settings, scene)
+    errors = settings.uncertainty(prediction)
     law = LAWS[settings.law](
-        settings.uncertainty(prediction),
+        errors,
         np.full(arm.joint_count, encoder.standard_deviation_rad()),
         joint_limits,
         settings.motion,
@@ -157,6 +163,8 @@ def build_parts(
         ),
         loop_age=LoopAge(settings.assumed_delay_s),
         limits=joint_limits,
+        following=Following(joint_limits, joint_names(scene)[0], encoder.standard_deviation_rad()),
+        misplaced_m=float(np.linalg.norm(errors.mean_m)) + max(errors.quantile, 0.0) * errors.camera_sd_m,
         home_rad=scene.data.qpos[scene.robot.arm_positions].copy(),
         frames=stick_frames(scene),
         motion=settings.motion,
@@ -194,18 +202,8 @@ def _arm(
     robot, (travel, ends_rad) = scene.robot, stand(scene)
     opening_m = 0.0 if travel is None else float(travel.openings_m[0])
     open_fingers = scene.data.qpos[robot.finger_positions].copy()
-    shape = ArmShape(*_joint_names(scene), open_fingers, opening_m)
+    shape = ArmShape(*joint_names(scene), open_fingers, opening_m)
     return beside.arm(shape, scene.show), ends_rad, travel
-
-
-def _joint_names(scene: Scene) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return the names of the arm's joints and of the fingers' joints, in the model's order."""
-    model, robot = scene.model, scene.robot
-    names = {int(model.jnt_qposadr[joint]): model.joint(joint).name or f"joint{joint}" for joint in range(model.njnt)}
-    arm, fingers = (
-        tuple(names[place] for place in places.tolist()) for places in (robot.arm_positions, robot.finger_positions)
-    )
-    return arm, fingers
 
 
 def _camera(settings: RobotSettings, scene: Scene, seed: int) -> MujocoCamera:
@@ -217,7 +215,7 @@ def _notes(scene: Scene, settings: RobotSettings, travel: GripperTravel | None) 
     """Return the notes shown before the run: start pose, objects and their roles, and shapes that are not exact."""
     notes = [f"the arm starts at {scene.start_pose}"]
     if settings.arm is not None:
-        joints, fingers = (", ".join(names) or "none" for names in _joint_names(scene))
+        joints, fingers = (", ".join(names) or "none" for names in joint_names(scene))
         notes = [f"the driver's joints, in this order: {joints}; of the gripper: {fingers}"]
     if settings.model is not None:
         notes += site_findings(scene, settings.site_axis, travel)

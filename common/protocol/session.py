@@ -46,6 +46,7 @@ class SessionEvent(Enum):
     GAP = "no command for longer than the gap limit"
     OLD_LOOP = "loop age over the limit"
     ARM_LOST = "arm's newest state too old"
+    ASTRAY = "arm does not do what it is told"
     EMERGENCY_STOP = "emergency stop"
     WRONG_TOKEN = "command with another token"  # noqa: S105  # no password
     HAND_OVER = "hand-over button, somebody waits"
@@ -84,6 +85,7 @@ def _rows(
 
 
 _ARM_LOST: Final = "arm lost: nothing new is heard of it"
+_ASTRAY: Final = "the arm does not follow"
 
 
 def _build() -> tuple[Transition, ...]:
@@ -108,6 +110,9 @@ def _build() -> tuple[Transition, ...]:
         *_rows([state.DISARMED], event.ARM_LOST, None, _ARM_LOST),
         *_rows([state.READY, state.ARMED], event.ARM_LOST, state.DISARMED, _ARM_LOST),
         *_rows([state.STOPPED_READY], event.ARM_LOST, state.STOPPED, _ARM_LOST),
+        *_rows([state.DISARMED], event.ASTRAY, None, _ASTRAY),
+        *_rows([state.READY, state.ARMED], event.ASTRAY, state.DISARMED, _ASTRAY),
+        *_rows([state.STOPPED_READY], event.ASTRAY, state.STOPPED, _ASTRAY),
         *_rows(OWNING, event.EMERGENCY_STOP, state.STOPPED, "emergency stop"),
         *_rows(known, event.WRONG_TOKEN, None, "counted, never applied"),
         *_rows(OWNING, event.HAND_OVER, state.OBSERVING, "the owner handed the lease over"),
@@ -136,9 +141,12 @@ class Session:
         """Whether the operator has the lease."""
         return self.state in OWNING
 
-    def handle(self, event: SessionEvent) -> Transition | None:
-        """Apply the event; return the table's row for it. Return None, and change nothing, if there is none."""
+    def handle(self, event: SessionEvent, why: str | None = None) -> Transition | None:
+        """Apply the event; return the table's row for it. Return None, and change nothing, if there is none.
+
+        why: reason in more detail than the row's.
+        """
         row = TABLE.get((self.state, event))
         if row is not None:
-            self.state, self.why = row.after, row.why
+            self.state, self.why = row.after, why or row.why
         return row

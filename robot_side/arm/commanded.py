@@ -17,7 +17,7 @@ from robot_side.compiled.stack import on_stack
 
 _AT_END_RAD = 0.002
 """Distance from the end of its range, in rad, within which a joint counts as at the end: allows for encoder noise."""
-_LEVER_M: Final = 0.2
+LEVER_M: Final = 0.2
 """Distance from the tool's point at which a turn counts as a speed, in m: about a gripper's length"""
 _LEAST: Final = 0.01
 """Share of the command that is left undone up to which no cause is looked for"""
@@ -106,7 +106,7 @@ def _find_missed(
         if abs(rate) > fastest * limits[joint]:
             fastest, at_limit = abs(rate) / limits[joint], joint + 1
         for row in range(6):
-            one = (1.0 if row < 3 else _LEVER_M) * jacobian[row, joint] * rate
+            one = (1.0 if row < 3 else LEVER_M) * jacobian[row, joint] * rate
             given[row] += one
             stopped[row] += one if stays else 0.0
             part += one * one
@@ -114,7 +114,7 @@ def _find_missed(
             most, at_end = part, joint + 1
     asked, by_ends, by_rates, undone = 0.0, 0.0, 0.0, 0.0
     for row in range(6):
-        wanted = (1.0 if row < 3 else _LEVER_M) * twist[row]
+        wanted = (1.0 if row < 3 else LEVER_M) * twist[row]
         asked += wanted * wanted
         by_ends += stopped[row] * stopped[row]
         by_rates += (wanted - given[row]) ** 2

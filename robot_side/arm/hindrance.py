@@ -29,13 +29,17 @@ class Hindrance:
         self.undone = 0.0
         """Share of the commanded motion that the tool does not make, 0 to 1"""
 
-    def end(self) -> None:
-        """Note that nothing is commanded."""
-        self.text, self.undone = None, 0.0
+    def end(self, still: str | None = None) -> None:
+        """Note that nothing is commanded. still: what is to be told nevertheless."""
+        self.text, self.undone = still, 0.0
 
     def refuse(self, why: str) -> None:
         """Note that a command is refused as a whole."""
         self.text, self.undone = why, 1.0
+
+    def find(self, why: str) -> None:
+        """Note that the arm was found not to follow, whatever was foreseen."""
+        self.text = why
 
     def update(self, undone: float, cause: Cause | None, joint: int) -> None:
         """Take the figures of `Commanded`."""

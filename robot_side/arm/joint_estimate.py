@@ -59,6 +59,7 @@ class JointEstimate:
             measured.gripper_opening_m,
             measured.gripper_holding,
             measured.joint_loads_nm,
+            measured.simulated_s,
         )
         return self._last
 
@@ -82,6 +83,7 @@ class JointEstimate:
             last.gripper_opening_m,
             last.gripper_holding,
             last.joint_loads_nm,
+            last.simulated_s,
         )
 
     def _begin(self, measured: ArmState) -> ArmState:

@@ -34,6 +34,8 @@ class Situation:
     """Index of the held object, if any"""
     lateral: Vector2
     """Commanded deflection, right and up, of the stick that moves the tool across its approach axis"""
+    astray_m_s: float = 0.0
+    """Error of the tool's predicted velocity, while the arm does not follow (see `arm/following.py`)"""
 
 
 class Law(Protocol):

@@ -77,12 +77,13 @@ arm's v_max (m/s) and a (m/s²). sigma: D_σ (m). overlap: Σ V_ij at δ (m³), 
 SETTINGS: Final = np.dtype(
     [
         *((name, np.float64) for name in ("trigger_speed", "stick_speed", "turn_speed", "touch_speed")),
-        *((name, np.float64) for name in ("camera_variance", "quantile", "around")),
+        *((name, np.float64) for name in ("camera_variance", "quantile", "around", "astray")),
         ("mean", np.float64, (3,)),
     ]
 )
 """Settings of the law. Speeds are in m/s; turn_speed is in rad/s. camera_variance: σ_c² (m²). quantile: Φ⁻¹(P). mean:
-μ_ee - μ_c of eq. 10 (m). around: 0 if nobody asks for the map of onset distances, else 1."""
+μ_ee - μ_c of eq. 10 (m). around: 0 if nobody asks for the map of onset distances, else 1. astray: `astray_m_s` of
+`Situation`."""
 PROSPECT: Final = np.dtype(
     [
         ("direction", np.float64, (3,)),

@@ -81,6 +81,8 @@ def find_prospect(
     if side != STICK:
         rows = memory.missed_by_operator if by_operator else memory.missed_by_robot
         mean, sd = _prediction_error(rows, loop_age, found.speed)
+    # Until it stands, an arm that does not follow goes on as it now does.
+    mean += settings.astray * (loop_age + found.speed / found.acceleration)
     found.mean, found.mean_along, found.variance_along = 0.0, mean, sd * sd
     for axis in range(3):
         found.mean += found.direction[axis] * settings.mean[axis]

@@ -91,6 +91,7 @@ class SweptLaw:
         self._felt = felt_array()
         self._classes: tuple[object, IntArray, IntArray] | None = None
         self._frame: PerceivedObjects | None = None
+        self._astray_m_s = 0.0
         self._room: tuple[int, SceneTable | None] = (-1, None)
 
     def sense(self, situation: Situation, now_s: float) -> Sensed:
@@ -111,6 +112,8 @@ class SweptLaw:
             moving = velocities if velocities is None or since is None else velocities[since[0].things]
             if moving is None or np.abs(moving).max(initial=0.0) > STILL_M_S:
                 self.memory.state["moved"] = np.inf
+        if situation.astray_m_s != self._astray_m_s:
+            self._astray_m_s = self.memory.settings["astray"][0] = situation.astray_m_s
         if not sense(
             *(pose.tool_position_m, pose.tool_rotation, pose.tool_jacobian, pose.sphere_centers_m),
             *(pose.sphere_radii_m, pose.sphere_on_finger, situation.joint_velocities_rad_s),

@@ -74,7 +74,7 @@ class Safety:
         self._stop_followed = (-1, -1)
         """Epoch and sequence number of the newest emergency stop that was obeyed"""
         self._session: Session | None = None
-        self._arm_lost = False
+        self._arm_lost = self._arm_astray = False
         self._forget()
 
     def _forget(self) -> None:
@@ -155,6 +155,12 @@ class Safety:
         if self._arm_lost:
             self._handle(SessionEvent.ARM_LOST, now_s, f"arm lost: its newest state is {1e3 * age_s:.0f} ms old")
 
+    def arm_followed(self, stop: str | None, now_s: float) -> None:
+        """Stop the arm if it does not do what it is told; to be called in every tick. stop: why; None if it does."""
+        self._arm_astray = stop is not None
+        if stop is not None:
+            self._handle(SessionEvent.ASTRAY, now_s, f"the arm does not follow: {stop}")
+
     def check(self, now_s: float) -> None:
         """Stop the arm if the gap or the loop age is beyond its limit."""
         self._check_gap(now_s)
@@ -186,7 +192,7 @@ class Safety:
             self._handle(SessionEvent.TRIGGER_PULLED, now_s)
         elif command.emergency_stop:
             self._healthy_since_s = None
-        elif self._loop_is_young(now_s) and not self._arm_lost:
+        elif self._loop_is_young(now_s) and not (self._arm_lost or self._arm_astray):
             if self._healthy_since_s is None:
                 self._healthy_since_s = now_s
             if self._healthy_for_long(now_s):
@@ -203,7 +209,8 @@ class Safety:
             self._healthy_since_s = None
         if event is SessionEvent.EMERGENCY_STOP:
             self._stopped = True
-        row = None if self._session is None else self._session.handle(event)
+        said = why if event is SessionEvent.ASTRAY else None
+        row = None if self._session is None else self._session.handle(event, said)
         if row is None:
             return
         if row.after is SessionState.ARMED:

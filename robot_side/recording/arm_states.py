@@ -1,7 +1,7 @@
 """Encoding and decoding of the arm's recorded states. Exports need them without the kernels of a simulation.
 
     state   time f64, n u16, positions n f64, velocities n f64, f u16, fingers f f64, opening f64, holding u8,
-            loads n f64 or nothing
+            loads n f64 and simulated time f64, or the loads only, or nothing
 
 Values are float64, bit for bit as the core got them.
 """
@@ -16,7 +16,8 @@ from robot_side.arm.port import ArmState
 
 def pack_state(state: ArmState) -> bytes:
     """Encode a state."""
-    joints, fingers = state.joint_positions_rad, state.finger_positions
+    joints, fingers, loads = state.joint_positions_rad, state.finger_positions, state.joint_loads_nm
+    simulated_s = None if loads is None else state.simulated_s
     return b"".join(
         (
             struct.pack("<dH", state.time_s, len(joints)),
@@ -25,7 +26,8 @@ def pack_state(state: ArmState) -> bytes:
             struct.pack("<H", len(fingers)),
             fingers.tobytes(),
             struct.pack("<dB", state.gripper_opening_m, state.gripper_holding),
-            b"" if state.joint_loads_nm is None else state.joint_loads_nm.tobytes(),
+            b"" if loads is None else loads.tobytes(),
+            b"" if simulated_s is None else struct.pack("<d", simulated_s),
         )
     )
 
@@ -48,4 +50,5 @@ def unpack_state(content: bytes) -> ArmState:
     opening_m, holding = struct.unpack_from("<dB", content, position)
     position += 9
     loads = values(joints) if len(content) > position else None
-    return ArmState(time_s, positions, velocities, finger_positions, opening_m, bool(holding), loads)
+    simulated_s = struct.unpack_from("<d", content, position)[0] if len(content) > position else None
+    return ArmState(time_s, positions, velocities, finger_positions, opening_m, bool(holding), loads, simulated_s)

@@ -15,6 +15,7 @@ STOPPING = (
     SessionEvent.GAP,
     SessionEvent.OLD_LOOP,
     SessionEvent.ARM_LOST,
+    SessionEvent.ASTRAY,
     SessionEvent.EMERGENCY_STOP,
     SessionEvent.HAND_OVER,
     SessionEvent.SILENT,

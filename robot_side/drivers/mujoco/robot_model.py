@@ -123,6 +123,16 @@ def find_robot(model: Any, site_name: str | None) -> RobotModel:
     )
 
 
+def joint_names(scene: Simulated) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return the names of the arm's joints and of the fingers' joints, in the model's order."""
+    model, robot = scene.model, scene.robot
+    names = {int(model.jnt_qposadr[joint]): model.joint(joint).name or f"joint{joint}" for joint in range(model.njnt)}
+    arm, fingers = (
+        tuple(names[place] for place in places.tolist()) for places in (robot.arm_positions, robot.finger_positions)
+    )
+    return arm, fingers
+
+
 def turn_site(model: Any, site: int, axis: SiteAxis) -> None:
     """Turn the site's frame in a compiled model so that its new z axis is its present `axis`."""
     if axis == "z":

@@ -9,11 +9,13 @@ import pytest
 from robot_side.drivers.mujoco.arm import MujocoArm
 from robot_side.drivers.mujoco.brought.table import fit_target
 from robot_side.drivers.mujoco.checks.cost import cost_findings
+from robot_side.drivers.mujoco.checks.following import following_findings
 from robot_side.drivers.mujoco.checks.joints import joint_findings
 from robot_side.drivers.mujoco.checks.reach import reach_findings
 from robot_side.drivers.mujoco.checks.site_axis import site_findings
 from robot_side.drivers.mujoco.encoders import Encoder
 from robot_side.drivers.mujoco.gripper_measurement import measure_gripper
+from robot_side.drivers.mujoco.joint_reference import MotionLimits
 from robot_side.drivers.mujoco.robot_model import SiteAxis
 from robot_side.drivers.mujoco.scene import Scene, load_scene
 from tests.helpers.arm_models import TENDON_GRIPPER, planar_arm
@@ -161,6 +163,33 @@ def test_joints_that_do_not_move_as_expected_are_named(tmp_path: Path) -> None:
     dead = ('ctrlrange="-3.1416 3.1416"', 'ctrlrange="-2.9 2.9"')
     [line] = joint_lines(load_scene(brought(tmp_path, dead), "tool"))
     assert line.startswith("joints elbow: turn farther than")
+
+
+FOLLOWED = '<position name="wrist_3" joint="wrist_3" class="arm_small"/>'
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        (FOLLOWED, FOLLOWED, None),
+        (FOLLOWED, FOLLOWED + '<velocity joint="wrist_3" kv="50"/>', None),
+        (FOLLOWED, FOLLOWED.replace("class", 'forcerange="-0.01 0.01" class'), "joint 6 (wrist_3) does not move"),
+        ('<joint name="wrist_1"/>', '<joint name="wrist_1" damping="500"/>', "joint 4 (wrist_1) does not move"),
+        ('<joint name="elbow"', '<joint name="elbow" armature="900"', "joint 3 (elbow) does not move"),
+    ],
+)
+def test_joints_that_do_not_follow_when_they_are_tried_are_named(
+    old: str, new: str, said: str | None, tmp_path: Path
+) -> None:
+    scene = load_scene(brought(tmp_path, (old, new)), "tool")
+    arm = MujocoArm(scene, Encoder(0.0, 0.0))
+    before = scene.data.qpos.copy(), scene.data.ctrl.copy()
+    lines = following_findings(scene, arm, MotionLimits())
+    assert [line.partition(": ")[2] for line in lines] == [said] * (said is not None)
+    assert arm.state(5.0).simulated_s == scene.data.time == 0.0
+    assert not scene.data.qvel.any()
+    for now, then in zip((scene.data.qpos, scene.data.ctrl), before, strict=True):
+        np.testing.assert_array_equal(now, then)
 
 
 @pytest.mark.parametrize(

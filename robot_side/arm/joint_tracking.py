@@ -1,0 +1,227 @@
+"""Tracking of each joint: how far its motion stays behind what it was commanded, or goes beyond it.
+
+Arms follow late, and not all alike. So what to expect is an interval: of the velocities commanded within `LAG_S` and
+twice the states' lateness, which narrows no faster than the joints' limits of acceleration allow. The way that a joint
+misses, or makes beyond this interval and an allowance, is added up and slowly forgotten (a cumulative sum; Page, 1954).
+A joint that was behind may catch up.
+"""
+
+import math
+from enum import IntEnum
+from typing import Any, Final
+
+import numpy as np
+
+from common.arrays import FloatArray
+from robot_side.compiled.kernel import FLOAT64, INT64, building_block, compiled, inlined, input_array, record_array
+
+LAG_S: Final = 0.12
+"""Longest lag of an arm behind its commands, in s, without the lateness of its states"""
+_SLOT_S: Final = 0.02
+_SLOTS: Final = 20
+_LOST_S: Final = 0.1
+"""Time between two states, in s, after which tracking begins anew"""
+_ALLOWED: Final = 0.2
+_ALLOWED_RAD_S: Final = 0.03
+"""Deviations from the expected velocity that count as none: a share of it, and at least this velocity"""
+_FORGOTTEN_S: Final = 1.0
+_SPEED_S: Final = 0.1
+_RECENT_S: Final = 0.2
+_LOAD_S: Final = 0.03
+_USUAL_LOAD_S: Final = 1.0
+"""Time constants, in s, of the summed way, the measured velocity, a joint's recent share, its load and usual load"""
+_STILL: Final = 0.25
+_NO_LONGER_STILL: Final = 0.35
+_FOLLOWS: Final = 0.85
+"""Shares of its recent command: below the first a joint counts as still, up to the second it remains so, and from the
+last it follows again"""
+_DRIVEN_RAD_S: Final = 0.1
+"""Least expected velocity at which a still joint can stop the arm"""
+_NEAR_END_RAD: Final = 0.1
+"""Distance from the end of its range, beyond what it needs to stop, within which a joint may stand"""
+_LEAST_LOAD_NM: Final = 0.1
+_EXCUSED_S: Final = 0.3
+"""Rise of a joint's load that shows that something holds or pushes it, and time for which this explains a fault"""
+
+
+class Fault(IntEnum):
+    """Way in which a joint does not follow."""
+
+    NONE = 0
+    SLOW = 1
+    FAR = 2
+    """It moves faster than commanded, or on after the command."""
+    STILL = 3
+    ASTRAY = 4
+    """It moves in the other direction, or without a command."""
+
+
+TRACK: Final = np.dtype(
+    [
+        ("fault", np.int64),
+        *(
+            (name, np.float64)
+            for name in (
+                *("position", "least", "greatest", "next_least", "next_greatest", "toward", "short", "up", "down"),
+                *("speed", "told", "made", "lasts", "held", "load", "usual_load", "error"),
+            )
+        ),
+        ("least_told", np.float64, (_SLOTS,)),
+        ("greatest_told", np.float64, (_SLOTS,)),
+    ]
+)
+"""Record of a joint, in rad and s. held: time for which its load still explains its fault; 0 if it does not. least,
+greatest: expected velocity; next_least, next_greatest: what these approach. toward: last direction of that velocity.
+short: way that the joint stays behind. up, down: ways beyond. told, made: recent commanded and measured ways along
+`toward`. lasts: time for which a fault other than SLOW lasts, unless held. error: measured velocity beyond the expected
+ones, while at fault and not held. least_told, greatest_told: bounds of the commands in each time slot."""
+CLOCK: Final = np.dtype([("slot", np.int64), ("faults", np.int64), ("time", np.float64)])
+"""Record of the tracking: number of the newest time slot, number of joints at fault, time of the newest state"""
+
+
+@inlined
+def _approached(value: float, since: float, constant: float) -> float:
+    """Return the share by which a quantity with the time constant approaches another during `since`."""
+    return value * -math.expm1(-since / constant)
+
+
+@building_block
+def _begin(tracks: Any, command: FloatArray, positions: FloatArray, loads: FloatArray) -> None:
+    for j in range(tracks.size):
+        one = tracks[j]
+        one.position, one.toward, one.speed, one.error = positions[j], 0.0, 0.0, 0.0
+        one.least, one.greatest = min(command[j], 0.0), max(command[j], 0.0)
+        one.short, one.up, one.down, one.told, one.made, one.lasts = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        one.load = one.usual_load = loads[j] if loads.size > 0 else 0.0
+        one.fault, one.held = 0, 0.0
+        for slot in range(_SLOTS):
+            one.least_told[slot], one.greatest_told[slot] = one.least, one.greatest
+
+
+@building_block
+def _expect(
+    tracks: Any, clock: Any, lower: FloatArray, upper: FloatArray, fastest: FloatArray, since: float, late: float
+) -> None:
+    """Update the expected velocities. lower, upper (n,): ends of the ranges. fastest (n,): limits of acceleration."""
+    window, needed = min(int((LAG_S + 2.0 * late) / _SLOT_S) + 2, _SLOTS), 0.0
+    for j in range(tracks.size):
+        one = tracks[j]
+        least, greatest = math.inf, -math.inf
+        for k in range(window):
+            slot = (clock.slot - k) % _SLOTS
+            least, greatest = min(least, one.least_told[slot]), max(greatest, one.greatest_told[slot])
+        near = _NEAR_END_RAD + max(least * least, greatest * greatest) / (2.0 * fastest[j])
+        if one.position < lower[j] + near:
+            greatest = max(greatest, 0.0)
+        if one.position > upper[j] - near:
+            least = min(least, 0.0)
+        one.next_least, one.next_greatest = least, greatest
+        needed = max(needed, (least - one.least) / fastest[j], (one.greatest - greatest) / fastest[j])
+    share = since / needed if needed > since else 1.0
+    for j in range(tracks.size):
+        one = tracks[j]
+        one.least += min(share * (one.next_least - one.least), one.next_least - one.least)
+        one.greatest += max(share * (one.next_greatest - one.greatest), one.next_greatest - one.greatest)
+
+
+@building_block
+def _add_up(one: Any, moved: float, since: float) -> None:
+    """Add a joint's motion to its ways, behind and beyond what is expected."""
+    toward = 1.0 if one.least > 0.0 else -1.0 if one.greatest < 0.0 else 0.0
+    expected = max(one.least, -one.greatest, 0.0)
+    if toward == 0.0 or toward != one.toward:
+        one.told = one.made = 0.0
+        if toward != 0.0:
+            one.toward, one.short = toward, 0.0
+    kept = math.exp(-since / _FORGOTTEN_S)
+    wanted = (expected - max(_ALLOWED * expected, _ALLOWED_RAD_S)) * since
+    one.short = max(kept * one.short + wanted - one.toward * moved, 0.0)
+    most, least = max(one.greatest, 0.0), min(one.least, 0.0)
+    up = moved - (most + max(_ALLOWED * most, _ALLOWED_RAD_S)) * since
+    down = -moved - (max(-_ALLOWED * least, _ALLOWED_RAD_S) - least) * since
+    if one.short > 0.0:  # what was behind may catch up
+        up, down = (min(up, 0.0), down) if one.toward > 0.0 else (up, min(down, 0.0))
+    one.up, one.down = max(kept * one.up + up, 0.0), max(kept * one.down + down, 0.0)
+    recent = math.exp(-since / _RECENT_S)
+    one.told = recent * one.told + expected * since
+    one.made = recent * one.made + toward * moved
+    one.speed += _approached(moved / since - one.speed, since, _SPEED_S)
+
+
+@building_block
+def _judge(one: Any, load: float, since: float, limit: float) -> None:
+    """Update a joint's fault. limit: way that is noticed."""
+    before, fault, expected = one.fault, Fault.NONE, max(one.least, -one.greatest, 0.0)
+    side = 1.0 if one.up > one.down else -1.0
+    off = side * (one.speed - (one.greatest if side > 0.0 else one.least))
+    astray = before in (Fault.FAR, Fault.ASTRAY)
+    if (astray or max(one.up, one.down) > limit) and off > max(_ALLOWED * abs(one.speed), _ALLOWED_RAD_S):
+        fault = Fault.FAR if side == one.toward else Fault.ASTRAY
+    elif astray:
+        one.up = one.down = 0.0
+    elif expected > 0.0 and one.made < _FOLLOWS * one.told and (before > 0 or one.short > limit):
+        still = _NO_LONGER_STILL if before == Fault.STILL else _STILL
+        fault = Fault.STILL if one.made < still * one.told else Fault.SLOW
+    one.fault = fault
+    one.load += _approached(load - one.load, since, _LOAD_S)
+    if max(one.up, one.down, one.short) < 0.25 * limit:
+        one.usual_load += _approached(load - one.usual_load, since, _USUAL_LOAD_S)
+    # A drive that is held up or pushed presses against its deviation.
+    against = one.toward if fault in (Fault.STILL, Fault.SLOW) else -side
+    one.held = max(one.held - since, 0.0) if fault > 0 else 0.0
+    if fault > 0 and against * (one.load - one.usual_load) > _LEAST_LOAD_NM:
+        one.held = _EXCUSED_S
+    stopping = fault in (Fault.FAR, Fault.ASTRAY) or (fault == Fault.STILL and expected >= _DRIVEN_RAD_S)
+    one.lasts = one.lasts + since if stopping and fault == before and one.held == 0.0 else 0.0
+    one.error = one.speed - min(max(one.speed, one.least), one.greatest) if fault > 0 and one.held == 0.0 else 0.0
+
+
+@compiled(
+    *(record_array(TRACK), record_array(CLOCK), input_array(1), input_array(1), input_array(1)),
+    *(input_array(1), input_array(1), input_array(1), FLOAT64, FLOAT64, FLOAT64),
+    returns=INT64,
+)
+def track(
+    tracks: np.ndarray,
+    clocks: np.ndarray,
+    command: FloatArray,
+    positions: FloatArray,
+    loads: FloatArray,
+    lower: FloatArray,
+    upper: FloatArray,
+    fastest: FloatArray,
+    time: float,
+    late: float,
+    limit: float,
+) -> int:
+    """Take a tick's command (n,) and the newest state; return the number of joints at fault.
+
+    loads: (n,), or none. lower, upper, fastest: as in `_expect`. time, late: the state's time and lateness. limit: way
+    that is noticed.
+    """
+    clock, newest = clocks[0], math.floor(time / _SLOT_S)
+    since = time - clock.time
+    if not 0.0 <= since < _LOST_S:
+        clock.slot, clock.time, clock.faults = newest, time, 0
+        _begin(tracks, command, positions, loads)
+        return 0
+    for j in range(tracks.size):
+        one, slot = tracks[j], clock.slot % _SLOTS
+        one.least_told[slot] = min(one.least_told[slot], command[j])
+        one.greatest_told[slot] = max(one.greatest_told[slot], command[j])
+        for after in range(clock.slot + 1, newest + 1):
+            # A slot that no tick fell into had the commands of the one before.
+            lasts = after < newest
+            one.least_told[after % _SLOTS] = one.least_told[slot] if lasts else command[j]
+            one.greatest_told[after % _SLOTS] = one.greatest_told[slot] if lasts else command[j]
+    if since == 0.0:
+        return int(clock.faults)
+    clock.slot, clock.time, clock.faults = max(newest, clock.slot), time, 0
+    _expect(tracks, clock, lower, upper, fastest, since, late)
+    for j in range(tracks.size):
+        one, moved = tracks[j], positions[j] - tracks[j].position
+        one.position = positions[j]
+        _add_up(one, moved, since)
+        _judge(one, loads[j] if loads.size > 0 else 0.0, since, limit)
+        clock.faults += 1 if one.fault > 0 else 0
+    return int(clock.faults)
