@@ -11,11 +11,11 @@ from common.protocol.link_end import LinkEnd
 from common.protocol.messages import AnyMessage, Hello, LeaseNotice, MotionCommand, Tune
 from common.protocol.session import SessionState
 from common.status.codes import LinkState, Sight
-from operator_side.controller.feel import USUAL_LIGHT, WARNING_LIGHT, Rumble
+from operator_side.controller.feel import USUAL_LIGHT, WARNING_LIGHT
 from operator_side.controller.state import Button
 from operator_side.core import OperatorSide
 from operator_side.hands.travel_calibration import TravelCalibration, TriggerTravel
-from tests.helpers.felt import felt, telemetry
+from tests.helpers.felt import telemetry
 from tests.operator_side.operator_bench import Bench
 
 
@@ -62,17 +62,6 @@ def test_status_and_summary_speak_of_the_controllers_own_triggers(swapped: bool)
     none_beyond = {"beyond_horizon": 0}
     counts = {"writes": 1, "without_history": 1, "blind": 0}
     assert summary["rendering"] == {"l2": none_beyond, "r2": none_beyond} | counts
-
-
-def test_that_something_stands_is_felt_once_and_shown_as_long_as_it_does(bench: Bench) -> None:
-    assert bench.side.status(bench.now_s).stands is None
-    shaken = []
-    for stands in (False, *(True,) * 50):
-        bench.now_s += 0.01
-        bench.feel_field(felt(bench.robot.stamp(bench.now_s), stands=stands))
-        assert bench.side.status(bench.now_s).stands is stands
-        shaken.append(bench.device.rumble)
-    assert shaken == [Rumble(), *[Rumble(right=0.7)] * 8, *[Rumble()] * 42]
 
 
 def test_without_haptics_nothing_is_ever_written_and_the_hands_rest_all_the_same() -> None:

@@ -20,23 +20,6 @@ from robot_side.settings import RobotSettings
 from tests.robot_side.session_bench import Bench, Operator
 
 
-def test_an_armed_robot_moves_as_asked_and_stops_when_commands_stop(bench: Bench) -> None:
-    operator = bench.join(2)
-    bench.arm_it(operator)
-    start = bench.tool_m
-    bench.drive(0.5, operator, r2=0.4)
-    moved = bench.tool_m - start
-    assert 0.03 < moved[0] < 0.07  # 0.1 m/s for half a second, and for the gap that a command holds.
-    assert np.abs(moved[1:]).max() < 0.01
-    bench.tick(400)
-    assert bench.state == "disarmed"
-    rest = bench.tool_m
-    bench.tick(300)
-    assert np.linalg.norm(bench.tool_m - rest) < 2e-3
-    [stop] = bench.robot.summary()["stops"]
-    assert "no command for" in stop["reason"]
-
-
 def test_an_unarmed_robot_lets_no_load_sink_however_unevenly_it_ticks() -> None:
     scene = load_scene()
     robot = RobotSide(build_parts(RobotSettings(), epoch=1, clock_domain="test", scene=scene))

@@ -197,19 +197,6 @@ TestConnections = Connections.TestCase
 TestConnections.settings = settings(max_examples=200, stateful_step_count=30, phases=[Phase.explicit, Phase.generate])
 
 
-def test_the_new_owner_of_a_departed_senders_descriptor_stays(
-    robot: RobotSockets, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """The sender has left, and its descriptor may belong to another connection by now, for example a viewer's."""
-    ended: list[int] = []
-    monkeypatch.setattr(robot_sockets, "shut_down", ended.append)
-    monkeypatch.setattr(robot_sockets, "PEER_LIMIT_PER_S", 0)
-    frame = SimpleNamespace(get={int(zmq.SRCFD): DESCRIPTORS[0]}.__getitem__, bytes=b"payload")
-    monkeypatch.setattr(robot._inbox, "read", lambda: [[SimpleNamespace(bytes=b"gone"), frame]] * 2)
-    assert robot.receive() == []
-    assert (robot._all_seen, robot.flooding, ended) == (True, 2, [])
-
-
 def test_a_flooding_stranger_takes_nothing_from_the_operator_or_from_other_strangers() -> None:
     def seen(admission: Admission, *peers: bytes, operator: bytes | None = b"operator") -> list[bytes]:
         return [peer for peer, _ in admission.admitted([(peer, b"") for peer in peers], operator)]

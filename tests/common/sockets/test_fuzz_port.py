@@ -92,21 +92,6 @@ def test_two_thousand_hostile_inputs_leave_the_operator_heard_and_no_descriptor_
     assert until_descriptors_are(before, robot)
 
 
-@pytest.mark.parametrize("closes", [True, False])
-def test_handshakes_cut_off_at_every_byte(robot: RobotSockets, operator: OperatorSockets, closes: bool) -> None:
-    whole = GREETING + ready(b"DEALER")
-    hanging = []
-    for length in range(len(whole)):
-        connection = RawConnection(port_of(robot.control_endpoint), whole[:length])
-        if closes:
-            connection.close()
-        else:
-            hanging.append(connection)
-    assert is_heard(robot, operator)
-    for connection in hanging:
-        connection.close()
-
-
 def test_a_connection_that_never_introduces_itself_is_ended(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(robot_sockets, "HANDSHAKE_LIMIT_S", 0.2)
     with RobotSockets(EPHEMERAL) as robot:
@@ -191,16 +176,6 @@ def test_a_peer_back_under_its_name_is_no_stranger(robot: RobotSockets) -> None:
             assert drain(robot, PATIENT_S) == [b"here"]
             assert robot._peers.connections[b"same"].descriptor in robot._gates[0].connections._known
         assert until_descriptors_are(before, robot)
-
-
-@pytest.mark.parametrize("claimed", [CONTROL_LIMIT_BYTES + 1, 10**6, 2**31, 2**62, 2**63, 2**64 - 1])
-def test_a_frame_that_claims_too_much_ends_its_connection_alone(
-    robot: RobotSockets, operator: OperatorSockets, claimed: int
-) -> None:
-    with contextlib.closing(stranger(robot)) as connection:
-        connection.send(frame(bytes(100), claimed_bytes=claimed))
-        assert connection.ended()
-    assert is_heard(robot, operator)
 
 
 def test_the_largest_message_that_is_allowed_arrives_and_the_next_larger_does_not(robot: RobotSockets) -> None:

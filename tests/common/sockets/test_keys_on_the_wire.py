@@ -97,14 +97,6 @@ def stays_out_and_says(robot: Robot, operator: OperatorSockets, text: str) -> bo
     return False
 
 
-def test_operators_with_keys_of_their_own_are_told_apart(robot: Robot) -> None:
-    with robot.operator("anna") as anna, robot.operator("ben") as ben:
-        assert gets_in(robot, anna)
-        assert gets_in(robot, ben)
-        assert len({connection.peer for connection in robot.sockets._peers.connections.values()}) == 2
-        assert (anna.trouble, robot.sockets.refused) == (None, 0)
-
-
 def test_an_unknown_key_gets_nothing_and_both_sides_say_what_to_do(robot: Robot) -> None:
     public, secret = make_key_pair()
     with robot.connect(OperatorKeys(secret, robot.public)) as stranger:

@@ -25,7 +25,6 @@ from common.sockets.shell import CONTROL_UNSENT_BYTES, VIEW_HIGH_WATER_MARK, VIE
 from common.sockets.turns import (
     CONNECTIONS,
     MOST_CONNECTIONS_EACH,
-    SILENCE_S,
     Offered,
     TurnConnection,
     Turns,
@@ -87,21 +86,6 @@ def test_a_silent_connection_gets_a_copy_twice_a_second_and_returns_once_heard()
     turns.heard(lively, 13.0)
     assert all(turns.send(b"newest", 13.0, everywhere=False) for _ in range(10))
     assert silent.taken == 5 + 5
-
-
-def test_a_long_silent_connection_is_passed_over_until_the_others_are_gone() -> None:
-    turns: Turns[Fed] = Turns(Fed.offered)
-    turns.connections.extend([silent := Fed(), heard := Fed()])
-    turns.heard(silent, 1.0)
-    turns.heard(heard, 1.0 + SILENCE_S)
-    assert all(turns.send(b"newest", 2.0, everywhere=False) for _ in range(4))
-    assert (silent.taken, heard.taken) == (2, 2)
-    turns.heard(heard, 1.01 + SILENCE_S)
-    assert all(turns.send(b"newest", 2.0, everywhere=False) for _ in range(4))
-    assert (silent.taken, heard.taken) == (2, 6)
-    turns.forget(heard)
-    assert turns.send(b"newest", 2.0, everywhere=False)
-    assert silent.taken == 3
 
 
 @given(name=st.binary(max_size=20))

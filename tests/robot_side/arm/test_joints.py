@@ -109,7 +109,6 @@ def test_limits_hold_and_keep_the_direction(twist: FloatArray, limits: FloatArra
         np.testing.assert_array_equal(limited, free)
 
 
-
 @pytest.mark.parametrize("joints", [5, 6, 7])
 @pytest.mark.parametrize("smallest", [0.0, 1e-9, 1e-3, 0.02, 0.05, 0.0599, 0.06 - 1e-12, 0.06 + 1e-12, 0.0601, 0.1])
 def test_the_solution_is_the_damped_one_on_both_sides_of_the_threshold(smallest: float, joints: int) -> None:
