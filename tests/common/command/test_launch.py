@@ -49,31 +49,26 @@ def test_a_signal_while_it_starts_ends_it_quietly(code: str, number: signal.Sign
 
 
 @pytest.mark.processes
-@pytest.mark.parametrize("where", [IMPORT, START])
-@pytest.mark.parametrize("flag", [["--summary", "{}"], ["--summary=other.json", "--summary={}"]])
-def test_a_run_that_never_began_has_a_summary(tmp_path: Path, flag: list[str], where: str) -> None:
-    path = tmp_path / "summary.json"
-    given = ["command", *(word.format(path) for word in flag)]
-    code = where.replace('["command"]', repr(given)).replace("stop)", "stop, has_summary=True)")
-    with start("-c", code) as process:
-        assert process.stdout is not None
-        assert process.stdout.readline() == "here\n"
-        process.send_signal(signal.SIGTERM)
-        assert process.wait(LIMIT_S) == 0
-    assert json.loads(path.read_text()) == {"duration_s": 0.0, "ticks": 0, "stops": [], "errors": []}
-    assert [*tmp_path.iterdir()] == [path]
-
-
-@pytest.mark.processes
-@pytest.mark.parametrize("flag", ["--summary=None", "--summary=", "--summary"])
-def test_without_a_summary_flag_there_is_no_summary(tmp_path: Path, flag: str) -> None:
-    code = IMPORT.replace('["command"]', repr(["command", flag])).replace("stop)", "stop, has_summary=True)")
+@pytest.mark.parametrize(
+    ("flags", "where", "file"),
+    [
+        *((["--summary", "new.json"], where, "new.json") for where in (IMPORT, START)),
+        (["--summary=other.json", "--summary=new.json"], IMPORT, "new.json"),
+        *(([flag], IMPORT, None) for flag in ("--summary=None", "--summary=", "--summary")),
+    ],
+)
+def test_a_run_that_never_began_has_a_summary_where_one_is_asked_for(
+    tmp_path: Path, flags: list[str], where: str, file: str | None
+) -> None:
+    code = where.replace('["command"]', repr(["command", *flags])).replace("stop)", "stop, has_summary=True)")
     with start("-c", f"import os; os.chdir({str(tmp_path)!r})" + code) as process:
         assert process.stdout is not None
         assert process.stdout.readline() == "here\n"
         process.send_signal(signal.SIGTERM)
         assert process.wait(LIMIT_S) == 0
-    assert [*tmp_path.iterdir()] == []
+    summary = {"duration_s": 0.0, "ticks": 0, "stops": [], "errors": []}
+    written = {path.name: json.loads(path.read_text()) for path in tmp_path.iterdir()}
+    assert written == ({} if file is None else {file: summary})
 
 
 BOTH = (signal.SIGINT, signal.SIGTERM)

@@ -53,15 +53,6 @@ class Waiting:
         return self._clock.now() >= self._message_s
 
 
-def test_a_sleep_that_ends_late_does_not_delay_the_turn() -> None:
-    clock = VirtualClock()
-    waiting = Waiting(clock, late_s=150e-6)
-    pacer = Pacer(PERIOD_S, PERIOD_S)
-    wait_for_turn(pacer, clock, waiting.wait)
-    assert waiting.slept_s == [pytest.approx(PERIOD_S - 200e-6)]
-    assert 0.0 <= clock.now() - pacer.deadline_s <= 2e-6
-
-
 def test_a_wait_that_ends_early_is_taken_up_again() -> None:
     clock = VirtualClock()
     waiting = Waiting(clock)
@@ -71,18 +62,23 @@ def test_a_wait_that_ends_early_is_taken_up_again() -> None:
     assert sum(waiting.slept_s) == pytest.approx(PERIOD_S - 200e-6, abs=2e-6)
 
 
-@pytest.mark.parametrize("message_s", [300e-6, 900e-6])
-def test_a_message_ends_the_sleep_and_the_spin(message_s: float) -> None:
+@pytest.mark.parametrize(
+    ("late_s", "message_s", "other_s", "ends_s"),
+    [
+        (150e-6, math.inf, math.inf, PERIOD_S),  # a sleep that ends late does not delay the turn
+        *((0.0, message_s, math.inf, message_s) for message_s in (300e-6, 900e-6)),
+        *((0.0, math.inf, other_s, min(other_s, PERIOD_S)) for other_s in (300e-6, 950e-6, 5e-3)),
+    ],
+)
+def test_a_wait_ends_with_a_message_or_what_is_due_first(
+    late_s: float, message_s: float, other_s: float, ends_s: float
+) -> None:
     clock = VirtualClock()
-    wait_for_turn(Pacer(PERIOD_S, PERIOD_S), clock, Waiting(clock, message_s=message_s).wait)
-    assert clock.now() == pytest.approx(message_s, abs=2e-6)
-
-
-@pytest.mark.parametrize("other_s", [300e-6, 950e-6, 5e-3])
-def test_what_is_due_earlier_ends_the_wait_too(other_s: float) -> None:
-    clock = VirtualClock()
-    wait_for_turn(Pacer(PERIOD_S, PERIOD_S), clock, Waiting(clock).wait, other_s)
-    assert clock.now() == pytest.approx(min(other_s, PERIOD_S), abs=2e-6)
+    waiting = Waiting(clock, late_s, message_s)
+    wait_for_turn(Pacer(PERIOD_S, PERIOD_S), clock, waiting.wait, other_s)
+    assert clock.now() == pytest.approx(ends_s, abs=2e-6)
+    # The last 200 us are not slept.
+    assert waiting.slept_s in ([], [pytest.approx(min(other_s, PERIOD_S) - 200e-6)])
 
 
 def test_what_is_overdue_does_not_wait() -> None:

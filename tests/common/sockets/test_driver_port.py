@@ -74,46 +74,20 @@ def test_beyond_this_machine_it_asks_for_keys_in_the_words_of_the_control_port(f
         DriverPort("here", flag, LIMIT_BYTES)
 
 
-def test_with_keys_only_allowed_peers_get_in_and_revoked_ones_are_not_heard(tmp_path: Path) -> None:
-    folder, (public, secret), (mine, own) = KeyFolder(tmp_path), make_key_pair(), make_key_pair()
-    folder.write_pair("robot", public, secret)
-    folder.allow("driver", mine)
-    keys = RobotKeys.load(tmp_path)
+def test_a_key_gets_in_once_it_is_allowed_and_is_not_heard_once_it_is_revoked(tmp_path: Path) -> None:
+    folder, (robot, secret), (public, ours) = KeyFolder(tmp_path), make_key_pair(), make_key_pair()
+    folder.write_pair("robot", robot, secret)
     with (
-        DriverPort(EPHEMERAL, "--arm", LIMIT_BYTES, keys=keys) as port,
+        DriverPort(EPHEMERAL, "--arm", LIMIT_BYTES, keys=RobotKeys.load(tmp_path)) as port,
         zmq.Context() as context,
         driver(context, port, b"stranger") as stranger,
         context.socket(zmq.DEALER) as part,
     ):
         stranger.send(b"let me in")
         part.setsockopt(zmq.LINGER, 0)
-        OperatorKeys(own, public).secure(part)
-        part.connect(port.endpoint)
-        part.send(b"state")
-        assert [payload for _, payload in heard(port)] == [b"state"]
-        folder.revoke("driver")
-        assert keys.allowed.refresh()
-        part.send(b"state")
-        for _ in range(_ROUNDS):
-            port.wait(0.01)
-            assert port.receive() == []
-            if port.revoked:
-                return
-        pytest.fail("it is let in still")
-
-
-def test_a_key_that_is_allowed_while_the_robot_side_waits_gets_in(tmp_path: Path) -> None:
-    folder, (robot, secret), (public, ours) = KeyFolder(tmp_path), make_key_pair(), make_key_pair()
-    folder.write_pair("robot", robot, secret)
-    told: list[str] = []
-    with (
-        DriverPort(EPHEMERAL, "--arm", LIMIT_BYTES, keys=RobotKeys.load(tmp_path)) as port,
-        zmq.Context() as context,
-        context.socket(zmq.DEALER) as part,
-    ):
-        part.setsockopt(zmq.LINGER, 0)
         OperatorKeys(ours, robot).secure(part)
         part.connect(port.endpoint)
+        told: list[str] = []
         for _ in range(_ROUNDS):
             port.wait(0.01)
             if told := port.refresh_keys():
@@ -126,3 +100,12 @@ def test_a_key_that_is_allowed_while_the_robot_side_waits_gets_in(tmp_path: Path
         part.connect(port.endpoint)
         part.send(b"state")
         assert [payload for _, payload in heard(port)] == [b"state"]
+        folder.revoke("driver")
+        port.refresh_keys()
+        part.send(b"state")
+        for _ in range(_ROUNDS):
+            port.wait(0.01)
+            assert port.receive() == []
+            if port.revoked:
+                return
+        pytest.fail("it is let in still")

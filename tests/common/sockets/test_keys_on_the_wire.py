@@ -121,11 +121,6 @@ def test_a_key_that_is_allowed_later_gets_in_without_a_restart(robot: Robot) -> 
         assert late.trouble is None
 
 
-def test_no_key_gets_nothing(robot: Robot) -> None:
-    with robot.connect(None) as bare:
-        assert stays_out_and_says(robot, bare, "--keys")
-
-
 def test_a_port_that_hangs_up_is_not_taken_for_one_that_asks_for_keys() -> None:
     clock = MonotonicClock()
     end_s = clock.now() + LIMIT_S
@@ -140,12 +135,13 @@ def test_a_port_that_hangs_up_is_not_taken_for_one_that_asks_for_keys() -> None:
             assert "still starting" in str(operator.trouble)
 
 
-def test_a_wrong_robot_key_gets_nothing(robot: Robot) -> None:
+def test_without_a_key_or_with_a_wrong_robot_key_nothing_comes_and_the_flag_is_named(robot: Robot) -> None:
     public, secret = make_key_pair()
     robot.folder.allow("anna", public)
     robot.sockets.refresh_keys()
-    with robot.connect(OperatorKeys(secret, public_part("01" * 32))) as misled:
-        assert stays_out_and_says(robot, misled, "--robot-key")
+    for keys, flag in ((None, "--keys"), (OperatorKeys(secret, public_part("01" * 32)), "--robot-key")):
+        with robot.connect(keys) as stranger:
+            assert stays_out_and_says(robot, stranger, flag)
 
 
 def test_a_robot_without_keys_is_not_trusted(tmp_path: Path) -> None:
