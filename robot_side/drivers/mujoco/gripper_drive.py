@@ -7,19 +7,15 @@ import numpy as np
 
 from common.arrays import FloatArray, IntArray
 from robot_side.compiled.kernel import building_block, inlined
-from robot_side.drivers.mujoco.gripper_measurement import (
-    LEAD,
-    NOTHING_M,
-    SLOW,
-    SPEED_TIME_CONSTANT_S,
-    STROKE_TIME_S,
-    GripperTravel,
-)
+from robot_side.drivers.mujoco.gripper_measurement import LEAD, NOTHING_M, GripperTravel
+from robot_side.drivers.mujoco.gripper_sweep import SPEED_TIME_CONSTANT_S, STROKE_TIME_S
 
 # Something stops the fingers if they rest although the drive leads by more than the gripper itself resists. They rest
 # if they move slower than this share of the stroke per second, for this time.
 _STANDING_SPEED_1_S = 0.05
 _STANDING_TIME_S = 0.05
+# Fingers that hold something may follow its slip. If they close faster than this share of their free speed, it is gone.
+_LOST_SHARE = 0.5
 
 GRIPPER: Final = np.dtype(
     [
@@ -32,12 +28,14 @@ GRIPPER: Final = np.dtype(
         ("least", np.float64),
         ("most", np.float64),
         ("stroke_time_s", np.float64),
+        ("servo_lag_s", np.float64),
         ("lag_s", np.float64),
+        ("force_lead", np.float64),
     ]
 )
 """Record of a gripper's drive. reference, closure: commanded and measured position, from 0 (open) to 1 (closed); the
 reference goes beyond, from `least` to `most`, to press. speed: averaged rate of the closure, in 1/s. standing_s: time
-for which something has stopped the fingers. lag_s: see `GripperTravel`."""
+for which something has stopped the fingers. servo_lag_s, lag_s, force_lead: see `GripperTravel`."""
 GRIPPER_INPUT: Final = np.dtype(
     [
         ("place", np.int64),
@@ -64,7 +62,9 @@ class GripperDrive:
             ("least", travel.ends[0]),
             ("most", travel.ends[1]),
             ("stroke_time_s", stroke_time_s),
-            ("lag_s", travel.lag_s),
+            ("servo_lag_s", travel.lags_s[0]),
+            ("lag_s", travel.lags_s[1]),
+            ("force_lead", travel.force_lead),
         ):
             self.drive[name] = value
         self.samples: FloatArray = np.column_stack(
@@ -144,19 +144,19 @@ def advance_gripper(
     gripper.closure = closure
     gripper.opening_m = _at_closure(samples, closure, 2)
     gripper.speed += (closure_speed - gripper.speed) * min(step_s / SPEED_TIME_CONSTANT_S, 1.0)
-    # A moving drive lags its reference without any force on the fingers.
-    free = _at_closure(samples, closure, 1) + gripper.lag_s * gripper.speed
+    free = _at_closure(samples, closure, 1)
     if moving != 0.0:
         gripper.told_to_close = 1 if moving > 0.0 else 0
         moved = gripper.reference + moving * step_s / gripper.stroke_time_s
+        # A moving drive lags its reference without any force on the fingers; a lead beyond the largest force is no use.
+        speed = max(math.copysign(1.0, moving) * gripper.speed, 0.0)
+        lead = min(gripper.lag_s * speed + LEAD, gripper.servo_lag_s * speed + gripper.force_lead)
         # The reference may lead only in the commanded direction, so that a grip is released at once.
-        lead = math.copysign(LEAD, moving)
-        moved = min(max(moved, free + min(lead, 0.0)), free + max(lead, 0.0))
+        moved = min(max(moved, free), free + lead) if moving > 0.0 else max(min(moved, free), free - lead)
         gripper.reference = min(max(moved, gripper.least), gripper.most)
 
-    resisted = gripper.reference - free > _at_closure(samples, closure, 3)
-    # Fingers that hold something may follow its slip. If they close fast, it is gone.
-    follows = gripper.standing_s >= _STANDING_TIME_S and gripper.speed * gripper.stroke_time_s < SLOW
+    resisted = gripper.reference - free - gripper.lag_s * gripper.speed > _at_closure(samples, closure, 3)
+    follows = gripper.standing_s >= _STANDING_TIME_S and gripper.speed * gripper.stroke_time_s < _LOST_SHARE
     standing = abs(gripper.speed) < _STANDING_SPEED_1_S or follows
     stopped = resisted and standing and gripper.told_to_close == 1
     gripper.standing_s = gripper.standing_s + step_s if stopped else 0.0

@@ -16,12 +16,6 @@ from robot_side.drivers.mujoco.robot_model import RobotModel, Simulated
 
 LEAD: Final = 0.3
 """Largest lead of the reference over a blocked drive, as a share of the stroke"""
-STROKE_TIME_S: Final = 0.6
-"""Time for the whole stroke at full speed, that of a Robotiq 2F-85: 85 mm at 150 mm/s (its manual)"""
-SPEED_TIME_CONSTANT_S: Final = 0.05
-"""Time constant of the measured speed: stiff fingers chatter on a gripped object"""
-SLOW: Final = 0.5
-"""Share of the free speed below which something may hold the fingers"""
 NOTHING_M: Final = 1e-3
 """Gap beyond that of the closed gripper up to which nothing is held"""
 _RESISTS: Final = 0.02
@@ -61,8 +55,11 @@ class GripperTravel:
     and links that hinder each other"""
     ends: tuple[float, float]
     """Least and greatest reference that the actuators' ranges allow"""
-    lag_s: float
-    """Lag of a moving drive behind its reference, in seconds: shares of the stroke for each share per second"""
+    lags_s: tuple[float, float]
+    """Lags of a moving drive behind its reference, in seconds: shares of the stroke for each share per second: by the
+    servo's own damping, which needs no force, and in all"""
+    force_lead: float
+    """Lead beyond the first lag that gives the servo's largest force, as a share of the stroke; infinite without one"""
     ahead_m: float
     """How far the fingers reach ahead of the tool's site, open or closed, in m"""
     closing: FloatArray
@@ -109,8 +106,9 @@ def measure_gripper(scene: Simulated) -> GripperTravel | None:
     way = sweep.controls[-1] - sweep.controls[0]
     shares = (np.array([lower, upper]) - sweep.controls[0])[:, way != 0.0] / way[way != 0.0]
     ends = min(float(shares.min(axis=0).max()), 0.0), max(float(shares.max(axis=0).min()), 1.0)
-    run = space.close(sweep, min(ends[1], 1.0 + LEAD), STROKE_TIME_S, SPEED_TIME_CONSTANT_S)
-    lag_s, alone = resistance(run, references, closures, openings_m)
+    lag_s, force_lead = _servo(model, actuators, way)
+    run = space.close(sweep, min(ends[1], 1.0 + LEAD), lag_s, force_lead)
+    whole_lag_s, alone = resistance(run, references, closures, openings_m)
     return GripperTravel(
         open_control=sweep.controls[0],
         closed_control=sweep.controls[-1],
@@ -121,13 +119,29 @@ def measure_gripper(scene: Simulated) -> GripperTravel | None:
         references=references,
         closures=closures,
         openings_m=openings_m,
-        resists=_RESISTS + _SAFELY * (alone + space.sag(sweep)),
+        resists=min(_RESISTS, 0.5 * force_lead) + _SAFELY * (alone + space.sag(sweep)),
         ends=ends,
-        lag_s=lag_s,
+        lags_s=(lag_s, max(lag_s, whole_lag_s)),
+        force_lead=force_lead,
         ahead_m=sweep.ahead_m,
         closing=gap.closing,
         jaws=gap.jaws,
     )
+
+
+def _servo(model: Any, actuators: IntArray, way: FloatArray) -> tuple[float, float]:
+    """Return the lag by the servos' own damping, in seconds, and the lead that gives the largest force.
+
+    way (g,): change of the inputs from open to closed. force = gain u - stiffness l - damping dl/dt
+    """
+    limits = np.where(
+        model.actuator_forcelimited[actuators], np.abs(model.actuator_forcerange[actuators]).min(axis=1), np.inf
+    )
+    stiffness, damping = -model.actuator_biasprm[actuators, 1], -model.actuator_biasprm[actuators, 2]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        leads = limits / np.abs(model.actuator_gainprm[actuators, 0] * way)
+        lags = np.where(stiffness > 0.0, damping / stiffness, 0.0)
+    return float(lags.max()), float(leads.min())
 
 
 def candidate_ends(lower: FloatArray, upper: FloatArray) -> list[tuple[FloatArray, FloatArray]]:

@@ -12,6 +12,10 @@ from robot_side.drivers.mujoco.gripper_gap import HandPoses
 from robot_side.drivers.mujoco.mesh_arrays import geom_points
 from robot_side.drivers.mujoco.robot_model import Simulated
 
+STROKE_TIME_S: Final = 0.6
+"""Time for the whole stroke at full speed, that of a Robotiq 2F-85: 85 mm at 150 mm/s (its manual)"""
+SPEED_TIME_CONSTANT_S: Final = 0.05
+"""Time constant of the measured speed: stiff fingers chatter on a gripped object"""
 _SAMPLES: Final = 9
 _SHORTEST_SETTLING_S, _LONGEST_SETTLING_S = 0.05, 2.0
 _RESTING: Final = 1e-3
@@ -148,22 +152,27 @@ class EmptySpace:
         poses = HandPoses(np.array(rotations), np.array(positions_m))
         return GripperSweep(controls, np.array(fingers), np.array(lengths), poses, max(ahead_m[0], ahead_m[-1]))
 
-    def close(self, sweep: GripperSweep, most: float, stroke_time_s: float, averaged_s: float) -> ClosingRun:
-        """Close on nothing by inputs that rise in `stroke_time_s` from open (0) to closed (1), and on to `most`.
+    def close(self, sweep: GripperSweep, most: float, lag_s: float, force_lead: float) -> ClosingRun:
+        """Close on nothing by inputs that rise from open (0) to closed (1), and on to `most`, at full speed.
 
-        sweep: from open to closed. averaged_s: time constant of the speeds.
+        sweep: from open to closed. The reference leads the fingers by what their speed, times `lag_s`, and the largest
+        force, at `force_lead`, need, as in `advance_gripper`.
         """
         self.settle(sweep.controls[0])
-        timestep_s, samples, speed = float(self.model.opt.timestep), [], 0.0
+        timestep_s, samples = float(self.model.opt.timestep), []
         way, weights = sweep.controls[-1] - sweep.controls[0], sweep.per_length
-        for step in range(round((most * stroke_time_s + _AFTER_S) / timestep_s)):
-            reference = min(step * timestep_s / stroke_time_s, most)
+        closures = (sweep.lengths - sweep.lengths[0]) @ weights
+        reference = closure = speed = 0.0
+        for _ in range(round((most * STROKE_TIME_S + _AFTER_S) / timestep_s)):
+            free = float(np.interp(closure, closures, np.linspace(0.0, 1.0, _SAMPLES)))
+            reference = min(reference + timestep_s / STROKE_TIME_S, free + lag_s * speed + force_lead, most)
             self.step(sweep.controls[0] + reference * way)
             lengths, rates = (
                 values[self.actuators] for values in (self.data.actuator_length, self.data.actuator_velocity)
             )
-            speed += (float(rates @ weights) - speed) * min(timestep_s / averaged_s, 1.0)
-            samples.append((reference, float((lengths - sweep.lengths[0]) @ weights), speed))
+            closure = float((lengths - sweep.lengths[0]) @ weights)
+            speed += (float(rates @ weights) - speed) * min(timestep_s / SPEED_TIME_CONSTANT_S, 1.0)
+            samples.append((reference, closure, speed))
         return ClosingRun(*np.array(samples).T)
 
     def sag(self, sweep: GripperSweep) -> float:

@@ -1,6 +1,5 @@
 """The simulated arm's compiled step, compared with plain NumPy and MuJoCo's own products in long random runs."""
 
-import math
 from collections.abc import Callable
 from pathlib import Path
 
@@ -70,13 +69,16 @@ class PlainGripper:
         closure = float((lengths - travel.open_lengths) @ travel.per_length)
         self.speed += (float(length_speeds @ travel.per_length) - self.speed) * min(step_s / 0.05, 1.0)
         self.opening_m = float(np.interp(closure, travel.closures, travel.openings_m))
-        free = np.interp(closure, travel.closures, travel.references) + travel.lag_s * self.speed
+        free = float(np.interp(closure, travel.closures, travel.references))
         if moving:
             self.closed_last = moving > 0.0
-            lead = sorted([0.0, math.copysign(0.3, moving)])
-            nearest, farthest = (free + end for end in lead)
-            self.reference = np.clip(np.clip(self.reference + moving * step_s / 0.6, nearest, farthest), *travel.ends)
-        resisted = self.reference - free > np.interp(closure, travel.closures, travel.resists)
+            lags = np.maximum(np.sign(moving) * self.speed, 0.0) * np.array(travel.lags_s)
+            lead = min(lags[1] + 0.3, lags[0] + travel.force_lead)
+            nearest, farthest = sorted([free, free + np.sign(moving) * lead])
+            moved = np.clip(self.reference + moving * step_s / 0.6, nearest, farthest)
+            self.reference = float(np.clip(moved, *travel.ends))
+        resists = np.interp(closure, travel.closures, travel.resists)
+        resisted = self.reference - free - travel.lags_s[1] * self.speed > resists
         stands = abs(self.speed) < 0.05 or (self.standing_s >= 0.05 and self.speed * 0.6 < 0.5)
         self.standing_s = self.standing_s + step_s if resisted and stands and self.closed_last else 0.0
 

@@ -50,7 +50,9 @@ def test_a_servo_lags_by_all_damping(tmp_path: Path) -> None:
     travel = measure_gripper(load_scene(planar_arm(tmp_path), "tcp"))
     assert travel is not None
     # The damping of the servo and of both fingers, for each N/m.
-    assert travel.lag_s == pytest.approx((10.0 + 2.0 * 10.0) / 100.0, rel=0.1)
+    assert travel.lags_s == pytest.approx((10.0 / 100.0, (10.0 + 2.0 * 10.0) / 100.0), rel=0.1)
+    # Of 100 N at 0.0156863 N for each of 255 steps, 25 times the stroke: never reached.
+    assert travel.force_lead == pytest.approx(25.0, rel=1e-3)
     assert (travel.open_control.item(), travel.closed_control.item()) == (255.0, 0.0)
     np.testing.assert_allclose(travel.openings_m[[0, -1]], [0.08, 0.0], atol=1e-3)
 
