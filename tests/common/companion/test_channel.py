@@ -61,17 +61,16 @@ def test_the_end_of_one_is_noticed_by_the_other() -> None:
 
 
 def test_what_was_sent_before_an_end_arrives_even_if_an_answer_finds_it_closed_first() -> None:
-    one, other = pair()
-    assert other.send(b"never read")  # Closing with this in the buffer is a reset, not a plain end.
-    sent = [bytes(300_000), b"last"]  # more than one read takes
-    assert all(one.send(message) for message in sent)
-    assert one.waiting == 0
-    one.close()
-    other.send(b"an answer")
-    assert other.ended
-    assert other.receive() == sent
-    assert other.receive() == []
-    other.close()
+    with pair() as (one, other):
+        assert other.send(b"never read")  # Closing with this in the buffer is a reset, not a plain end.
+        sent = [bytes(300_000), b"last"]  # more than one read takes
+        assert all(one.send(message) for message in sent)
+        assert one.waiting == 0
+        one.close()
+        other.send(b"an answer")
+        assert other.ended
+        assert other.receive() == sent
+        assert other.receive() == []
 
 
 def test_a_length_beyond_reason_ends_it() -> None:
