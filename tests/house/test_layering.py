@@ -60,7 +60,7 @@ ARROWS = """
     robot_side/drivers/mujoco: common common/files robot_side/arm robot_side/compiled robot_side/field
         robot_side/gripper robot_side/outcome/truth.py robot_side/overlap/meshes robot_side/surroundings
         robot_side/surroundings/kinds
-    robot_side/drivers/mujoco/checks: common robot_side/drivers/mujoco
+    robot_side/drivers/mujoco/checks: common robot_side/arm robot_side/drivers/mujoco
     robot_side/homing.py: common common/protocol robot_side/arm robot_side/gripper robot_side/surroundings
     robot_side/motion.py: common robot_side/arm robot_side/gripper robot_side/laws robot_side/operators
     robot_side/reporting: common common/emulation common/protocol common/rate common/sockets robot_side/arm
@@ -78,7 +78,7 @@ ARROWS = """
         robot_side/laws/named.py robot_side/operators robot_side/viewing
     robot_side/recording: common common/recording robot_side/arm robot_side/compiled robot_side/events.py
         robot_side/settings.py robot_side/surroundings
-    robot_side/parts.py: common common/protocol common/timing robot_side/compiled robot_side/core.py
+    robot_side/parts.py: common common/protocol common/timing robot_side/arm robot_side/compiled robot_side/core.py
         robot_side/drivers/mujoco robot_side/drivers/mujoco/checks robot_side/drivers/remote robot_side/enlargement
         robot_side/gripper robot_side/laws robot_side/laws/named.py robot_side/operators robot_side/outcome
         robot_side/settings.py robot_side/surroundings robot_side/viewing

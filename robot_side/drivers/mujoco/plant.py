@@ -16,7 +16,7 @@ from robot_side.drivers.mujoco.drives.joint_drives import (
     servo_velocity,
 )
 from robot_side.drivers.mujoco.encoders import reading
-from robot_side.drivers.mujoco.gripper_drive import GRIPPER, GRIPPER_INPUT, advance_gripper
+from robot_side.drivers.mujoco.hand.gripper_drive import GRIPPER, GRIPPER_INPUT, advance_gripper
 from robot_side.drivers.mujoco.joint_reference import REFERENCE, advance_references
 
 INERTIA: Final = np.dtype([("place", np.int64), ("row", np.int64), ("column", np.int64)])

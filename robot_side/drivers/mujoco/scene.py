@@ -17,7 +17,7 @@ from common.roles import Role
 from robot_side.arm.port import ArmState
 from robot_side.drivers.mujoco.brought.table import TABLE_PREFIX, attach, keep_from_slipping, settle, usual_place
 from robot_side.drivers.mujoco.built_in_scenes import SceneName, furnish
-from robot_side.drivers.mujoco.gripper_servos import serve_gripper
+from robot_side.drivers.mujoco.hand.gripper_servos import serve_gripper
 from robot_side.drivers.mujoco.model_enums import GeomKind
 from robot_side.drivers.mujoco.object_primitives import ObjectPrimitives, SceneObject
 from robot_side.drivers.mujoco.robot_model import (

@@ -9,7 +9,7 @@ import numpy as np
 
 from common.roles import Role
 from robot_side.drivers.mujoco.drives.actuators import moves_any
-from robot_side.drivers.mujoco.gripper_measurement import GripperTravel
+from robot_side.drivers.mujoco.hand.gripper_measurement import GripperTravel
 from robot_side.drivers.mujoco.model_enums import JointKind
 from robot_side.drivers.mujoco.scene import Scene
 
@@ -89,7 +89,7 @@ def _filled(scene: Scene) -> str:
     model, robot = scene.model, scene.robot
     deepest_m, one, other = 0.0, 0, 0
     on_finger = set(robot.gripper_geoms[robot.geom_on_finger].tolist())
-    for a, b in combinations(robot.gripper_geoms.tolist(), 2):
+    for b, a in combinations(robot.gripper_geoms.tolist(), 2):
         if on_finger.isdisjoint((a, b)) or model.geom_bodyid[a] == model.geom_bodyid[b]:
             continue
         if (apart_m := mujoco.mj_geomDistance(model, scene.data, a, b, 1.0, None)) < deepest_m:

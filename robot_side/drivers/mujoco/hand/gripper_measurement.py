@@ -9,9 +9,9 @@ import numpy as np
 
 from common.arrays import FloatArray, IntArray
 from common.errors import ConfigurationError
-from robot_side.drivers.mujoco.gripper_cover import GripperCover
-from robot_side.drivers.mujoco.gripper_gap import Gap, Jaw, convex_geoms, find_gap, patch_m
-from robot_side.drivers.mujoco.gripper_sweep import ClosingRun, EmptySpace, GripperSweep
+from robot_side.drivers.mujoco.hand.gripper_cover import GripperCover
+from robot_side.drivers.mujoco.hand.gripper_gap import Gap, Jaw, convex_geoms, find_gap, patch_m
+from robot_side.drivers.mujoco.hand.gripper_sweep import ClosingRun, EmptySpace, GripperSweep
 from robot_side.drivers.mujoco.robot_model import RobotModel, Simulated
 
 LEAD: Final = 0.3

@@ -8,7 +8,7 @@ import mujoco  # type: ignore[import-untyped]
 import numpy as np
 
 from common.arrays import FloatArray
-from robot_side.drivers.mujoco.gripper_gap import HandPoses
+from robot_side.drivers.mujoco.hand.gripper_gap import HandPoses
 from robot_side.drivers.mujoco.mesh_arrays import geom_points
 from robot_side.drivers.mujoco.robot_model import Simulated
 
@@ -148,7 +148,7 @@ class EmptySpace:
             rotations.append(frame.T @ at.xmat.reshape(*bodies, 3))
             positions_m.append((at.xpos - at.site_xpos[robot.site]) @ frame)
             points_m = geom_points(self.model, at, robot.gripper_geoms[robot.geom_on_finger])
-            ahead_m.append(float(((points_m - at.site_xpos[robot.site]) @ frame[:, 2]).max(initial=0.0)))
+            ahead_m.append(float(((points_m - at.site_xpos[robot.site]) @ frame[:, 2]).max()) if len(points_m) else 0.0)
         poses = HandPoses(np.array(rotations), np.array(positions_m))
         return GripperSweep(controls, np.array(fingers), np.array(lengths), poses, max(ahead_m[0], ahead_m[-1]))
 

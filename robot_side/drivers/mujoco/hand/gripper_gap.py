@@ -9,7 +9,7 @@ import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
 from common.arrays import FloatArray, IntArray
-from robot_side.drivers.mujoco.gripper_cover import link_solids
+from robot_side.drivers.mujoco.hand.gripper_cover import link_solids
 from robot_side.drivers.mujoco.mesh_arrays import mesh_vertices
 from robot_side.drivers.mujoco.model_enums import GeomKind
 

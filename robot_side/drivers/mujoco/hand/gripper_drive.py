@@ -7,8 +7,8 @@ import numpy as np
 
 from common.arrays import FloatArray, IntArray
 from robot_side.compiled.kernel import building_block, inlined
-from robot_side.drivers.mujoco.gripper_measurement import LEAD, NOTHING_M, GripperTravel
-from robot_side.drivers.mujoco.gripper_sweep import SPEED_TIME_CONSTANT_S, STROKE_TIME_S
+from robot_side.drivers.mujoco.hand.gripper_measurement import LEAD, NOTHING_M, GripperTravel
+from robot_side.drivers.mujoco.hand.gripper_sweep import SPEED_TIME_CONSTANT_S, STROKE_TIME_S
 
 # Something stops the fingers if they rest although the drive leads by more than the gripper itself resists. They rest
 # if they move slower than this share of the stroke per second, for this time.
