@@ -1,5 +1,6 @@
 """Loop of a side: turns at absolute deadlines, messages when they arrive, other work after sending."""
 
+import sys
 from typing import Any, Protocol, TypeVar
 
 from common.clock import Clock, MonotonicClock, ThreadClock
@@ -55,10 +56,11 @@ class Loop:
         self.pacer = Pacer(period_s, self.start_s, seed)
         self._period = PeriodMonitor(self.pacer, self.clock, self.computed, remedy)
         self._collection = IdleCollection(self.clock)
+        self._loaded_late: list[str] = []
 
     def run(self, side: Side[Received], stop: StopSignal, duration_s: float | None) -> None:
         """Run until `stop` is set or `duration_s` has passed; show a note, once, if the period cannot be kept."""
-        pacer, clock = self.pacer, self.clock
+        pacer, clock, loaded = self.pacer, self.clock, frozenset(sys.modules)
         with self._collection:
             self.start_s = clock.now()
             pacer.restart(self.start_s)
@@ -82,11 +84,16 @@ class Loop:
                 if (said := self._period.end(turned=turned)) is not None:
                     side.note(said)
                 wait_for_turn(pacer, clock, side.wait, side.next_due())
+        self._loaded_late = sorted(sys.modules.keys() - loaded)
 
     def summary(self, side: str) -> dict[str, Any]:
-        """Return the loop's part of a run's summary: duration and pacing of the turns."""
+        """Return the loop's part of a run's summary: duration and pacing of the turns, and modules loaded in turns.
+
+        Such a module may delay the next command for longer than an arm goes on without one.
+        """
         return {
             "duration_s": self.clock.now() - self.start_s,
             "machine": {side: self._period.summary()},
             "pacing": {side: self.pacer.summary() | {"garbage": self._collection.summary()}},
+            "loaded_late": {side: self._loaded_late},
         }

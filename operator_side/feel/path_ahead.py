@@ -92,7 +92,9 @@ def _traced(
     first = int(np.searchsorted(speeds_m_s, 0.0, side="right"))
     if first == len(travels):
         return FREE
-    some = np.unique(np.linspace(0, len(course.displacements_m) - 1, _UNDER_WAY).astype(np.int64))
+    # In order, so that np.unique is not needed: its first call loads a part of NumPy, which takes longer than a turn.
+    some = np.linspace(0, len(course.displacements_m) - 1, _UNDER_WAY).astype(np.int64)
+    some = some[np.diff(some, prepend=-1) > 0]
     speeds_m_s, here_s = speeds_m_s[first:, None], course.aside_s[some]
     ahead_m, ahead_s = _ahead(course, speeds_m_s, aside.sticks, full_m_s, horizon_s)
     points = np.concatenate([here_s, ahead_s.reshape(-1, 4)]) / aside.around.full_s
