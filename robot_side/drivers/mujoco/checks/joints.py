@@ -39,6 +39,7 @@ def joint_findings(scene: Scene, travel: GripperTravel | None) -> list[str]:
         (loose, "without an actuator, so that they move freely"),
         (outside, "start outside their ranges"),
         (stuck, "start at an end of their ranges, and move only one way"),
+        (_weak(scene), "sink from the start: their actuators are too weak to hold them there"),
         (dead, "turn farther than their actuators' ctrlrange lets them: the rest of their ranges is dead"),
     )
     found = [f"joints {_few(names)}: {what}" for names, what in lines if names]
@@ -56,6 +57,28 @@ def _dead(scene: Scene) -> list[str]:
         low, high = sorted((scale * drives.lowest[row], scale * drives.highest[row]))
         if math.isfinite(upper - lower) and (low > lower + _SAME or high < upper - _SAME):
             names.append(_name(scene.model, int(robot.arm_joints[joint])))
+    return names
+
+
+def _weak(scene: Scene) -> list[str]:
+    """Return the arm's joints whose actuators, at any input, do not give what holds them at the start."""
+    model, robot, drives = scene.model, scene.robot, scene.robot.drives
+    data = mujoco.MjData(model)
+    data.qpos[:] = scene.data.qpos
+    mujoco.mj_forward(model, data)
+    needed = (data.qfrc_bias - data.qfrc_passive)[robot.arm_velocities]
+    sprung = drives.offset - drives.stiffness * drives.gear * data.qpos[robot.arm_positions][drives.joint]
+    ends = []
+    for inputs in (drives.lowest, drives.highest):
+        driven = np.multiply(drives.gain, inputs, out=np.zeros_like(sprung), where=drives.gain != 0.0)
+        ends.append(np.clip(drives.gear * (driven + sprung), -drives.strongest, drives.strongest))
+    least, most = (np.bincount(drives.joint, of(*ends)) for of in (np.minimum, np.maximum))
+    given = np.clip(needed, least, most)
+    names = []
+    for index in np.flatnonzero(np.abs(given - needed) > model.dof_frictionloss[robot.arm_velocities] + _SAME):
+        joint = int(robot.arm_joints[index])
+        unit = "N" if model.jnt_type[joint] == JointKind.SLIDE else "N m"
+        names.append(f"{_name(model, joint)} ({abs(given[index]):.1f} of {abs(needed[index]):.1f} {unit})")
     return names
 
 

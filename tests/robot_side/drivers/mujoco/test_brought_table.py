@@ -202,6 +202,14 @@ def test_joints_that_start_outside_their_ranges_are_named(old: str, new: str, sa
     assert not any("at an end" in line for line in lines)
 
 
+@pytest.mark.parametrize(("most", "said"), [("100", False), ("5", True)])
+def test_motors_too_weak_to_hold_the_start_are_named(most: str, said: bool, tmp_path: Path) -> None:
+    servo = '<position name="shoulder_lift" joint="shoulder_lift" class="arm_large"/>'
+    motor = f'<motor name="shoulder_lift" joint="shoulder_lift" ctrlrange="-{most} {most}"/>'
+    lines = joint_lines(load_scene(brought(tmp_path, (servo, motor), (' gravcomp="1"', "")), "tool"))
+    assert any("joints shoulder_lift (5.0 of " in line and "too weak" in line for line in lines) is said
+
+
 def test_a_hand_without_driven_fingers_is_said(tmp_path: Path) -> None:
     bare = planar_arm(tmp_path, gripper_actuators="")
     assert any("no actuator opens and closes" in line for line in joint_lines(load_scene(bare, "tcp")))
