@@ -10,6 +10,7 @@ import numpy as np
 from common.roles import Role
 from robot_side.drivers.mujoco.drives.actuators import moves_any
 from robot_side.drivers.mujoco.hand.gripper_measurement import GripperTravel
+from robot_side.drivers.mujoco.mesh_arrays import geom_points
 from robot_side.drivers.mujoco.model_enums import JointKind
 from robot_side.drivers.mujoco.scene import Scene
 
@@ -20,6 +21,8 @@ _OUTSIDE: Final = 1e-3
 _NAMED: Final = 4
 _FILLS_M: Final = 0.01
 """Depth of a hand's part inside another one from which there may be no gap between them"""
+_TIPS_M: Final = 0.03
+"""Distance from the hand's end within which its parts are at the fingertips"""
 
 
 def joint_findings(scene: Scene, travel: GripperTravel | None) -> list[str]:
@@ -108,11 +111,15 @@ def _grip(scene: Scene, travel: GripperTravel | None) -> list[str]:
 
 
 def _filled(scene: Scene) -> str:
-    """Return how deep the hand's parts are inside each other at the start, if that leaves no gap: meshes are convex."""
+    """Return how deep parts at the fingertips are inside each other at the start, if so deep that no gap is left."""
     model, robot = scene.model, scene.robot
     deepest_m, one, other = 0.0, 0, 0
     on_finger = set(robot.gripper_geoms[robot.geom_on_finger].tolist())
-    for b, a in combinations(robot.gripper_geoms.tolist(), 2):
+    approach = scene.data.site_xmat[robot.site].reshape(3, 3)[:, 2]
+    hand = robot.gripper_geoms.tolist()
+    ends_m = {geom: float((geom_points(model, scene.data, np.array([geom])) @ approach).max()) for geom in hand}
+    tips = [geom for geom, end_m in ends_m.items() if end_m > max(ends_m.values()) - _TIPS_M]
+    for b, a in combinations(tips, 2):
         if on_finger.isdisjoint((a, b)) or model.geom_bodyid[a] == model.geom_bodyid[b]:
             continue
         if (apart_m := mujoco.mj_geomDistance(model, scene.data, a, b, 1.0, None)) < deepest_m:
