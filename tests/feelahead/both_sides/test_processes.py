@@ -10,6 +10,7 @@ import signal
 import socket
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
@@ -328,21 +329,53 @@ os.execv(sys.argv[1], sys.argv[1:])
 """
 
 
-def test_strangers_who_only_connect_cost_nobody_the_session(tmp_path: Path) -> None:
+class Crowd(threading.Thread):
+    """Thread that connects to a port as soon and as often as possible, and keeps the connections open."""
+
+    def __init__(self, port: int) -> None:
+        super().__init__(daemon=True)
+        self.held: list[socket.socket] = []
+        self.gone = threading.Event()
+        self._port = port
+
+    def run(self) -> None:
+        while len(self.held) < 400 and not self.gone.is_set():
+            stranger = socket.socket()
+            try:
+                stranger.connect(("127.0.0.1", self._port))
+            except OSError:
+                stranger.close()
+                self.gone.wait(1e-3)
+            else:
+                self.held.append(stranger)
+
+    def leave(self) -> None:
+        self.gone.set()
+        self.join(LIMIT_S)
+        for stranger in self.held:
+            stranger.close()
+
+
+def test_strangers_who_only_connect_neither_end_the_start_nor_cost_anybody_the_session(tmp_path: Path) -> None:
     folder, summary = KeyFolder(tmp_path / "keys"), tmp_path / "out.json"
     (robot_key, robot_secret), (anna_key, anna_secret), (ben_key, _) = (make_key_pair() for _ in range(3))
     folder.write_pair("robot", robot_key, robot_secret)
     folder.write_pair("operator", anna_key, anna_secret)
     folder.allow("anna", anna_key)
     folder.allow("ben", ben_key)
-    keys = f"--keys={folder.path}"
+    keys, port = f"--keys={folder.path}", free_port()
+    flags = [f"--bind=tcp://127.0.0.1:{port}", "--view-bind=tcp://127.0.0.1:0", keys, f"--summary={summary}"]
+    early = Crowd(port)
+    early.start()
     with (
-        SideProcess(
-            "robot_side", "robot", [*ROBOT, keys, f"--summary={summary}"], before=[sys.executable, "-c", FEW]
-        ) as robot,
         contextlib.ExitStack() as crowd,
+        SideProcess("robot_side", "robot", flags, before=[sys.executable, "-c", FEW]) as robot,
     ):
+        crowd.callback(early.leave)
         listening = robot.wait_for("listening", LIMIT_S)
+        early.join(LIMIT_S)
+        assert len(early.held) == 400
+        early.leave()
         ends = [f"--connect={listening['control']}", f"--view-connect={listening['view']}", "--device=simulated"]
         with SideProcess("operator_side", "operator", [*ends, keys, f"--robot-key={robot_key}"]) as operator:
             assert any(robot.wait_for("status", LIMIT_S)["state"] == "armed" for _ in range(5000))

@@ -5,11 +5,11 @@ import socket
 import struct
 
 from common.sockets.greeting import KNOCK
+from tests.helpers.machines.waiting import LIMIT_S
 
 GREETING = KNOCK + b"NULL".ljust(20, b"\0") + bytes(32)
 """Greeting of 64 bytes: signature and version, mechanism NULL, then zeros: not a server, and filler."""
 _MORE, _LONG, _COMMAND = 1, 2, 4
-_TIMEOUT_S = 5.0
 
 
 def ready(socket_type: bytes, name: bytes = b"") -> bytes:
@@ -43,7 +43,7 @@ def port_of(endpoint: str) -> int:
 
 
 class RawConnection:
-    """TCP connection to a port of this machine, with a time-out of 5 s. The other side may end it at any time."""
+    """TCP connection to a port of this machine, with a time limit. The other side may end it at any time."""
 
     def __init__(self, port: int, sends: bytes = b"", buffer_bytes: int | None = None) -> None:
         """Connect and send `sends`. buffer_bytes: the kernel's receive buffer, small for a peer that does not read."""
@@ -52,7 +52,7 @@ class RawConnection:
         self._socket = socket.socket()
         if buffer_bytes is not None:
             self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, buffer_bytes)
-        self._socket.settimeout(_TIMEOUT_S)
+        self._socket.settimeout(LIMIT_S)
         self._socket.connect(("127.0.0.1", port))
         self._socket.sendall(sends)
 
@@ -85,10 +85,10 @@ class RawConnection:
         return received
 
     def ended(self) -> bool:
-        """Wait until the other side ends the connection, then return True; return False after 5 s without bytes."""
+        """Wait until the other side ends the connection, then return True; return False if nothing comes for long."""
         if not self.open:
             return True
-        self._socket.settimeout(_TIMEOUT_S)
+        self._socket.settimeout(LIMIT_S)
         try:
             while self._socket.recv(65536):
                 pass
@@ -124,4 +124,4 @@ class RawConnection:
                 del content
             self.close()
         except BlockingIOError:
-            self._socket.settimeout(_TIMEOUT_S)
+            self._socket.settimeout(LIMIT_S)
