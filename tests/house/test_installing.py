@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.helpers.installing import installed, link_packages, run
+from tests.helpers.machines.installing import installed, link_packages, run
 from tests.helpers.repository import ROOT
 
 pytestmark = [pytest.mark.install, pytest.mark.xdist_group("wheel")]

@@ -25,7 +25,6 @@ from operator_side.dualsense.reports.output_report import parse_output_report
 from operator_side.dualsense.simulated.controller import SIMULATED_ADDRESS
 from tests.feelahead.commands.conftest import Played
 from tests.helpers.fake_hid import ADDRESS
-from tests.helpers.machines.waiting import LIMIT_S
 from tests.helpers.repository import ROOT
 
 pytestmark = pytest.mark.usefixtures("own_folder")
@@ -211,8 +210,7 @@ def test_what_cannot_be_stored_is_said_before_the_first_press(
 
 
 @pytest.mark.processes
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGHUP, signal.SIGKILL])
-def test_the_triggers_are_released_however_its_process_ends(tmp_path: Path, number: signal.Signals) -> None:
+def test_the_triggers_are_released_when_its_process_is_killed(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "hidraw3")
     (tmp_path / "plugged").touch()
     controller = os.open(tmp_path / "hidraw3", os.O_RDWR)
@@ -230,9 +228,8 @@ def test_the_triggers_are_released_however_its_process_ends(tmp_path: Path, numb
             # This test itself is a second writer.
             expected = f"({os.getpid()}) holds the controller open for writing, too".encode()
             assert any(expected in line for line in process.stdout)
-            process.send_signal(number)
-            assert process.wait(LIMIT_S) == (-9 if number is signal.SIGKILL else 0)
-            # On a busy machine the wall may have been written again; after a kill -9 the guard releases.
+            process.kill()
+            # On a busy machine the wall may have been written again; the guard releases.
             while parse_output_report(os.read(controller, 1 << 16)[-REPORT_LENGTH:]).r2 != FREE_TRIGGER:
                 pass
         finally:

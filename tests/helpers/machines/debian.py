@@ -30,9 +30,11 @@ def install(packages: Sequence[str], program: str) -> None:
         return
     if os.environ.get("CI") != "true" or os.geteuid() != 0 or shutil.which("apt-get") is None:
         pytest.skip(f"no {program} (run as root with CI=true, the tests install Debian's)")
-    run_or_skip(["apt-get", "update", "-qq"])
     settings = {"DEBIAN_FRONTEND": "noninteractive"}
-    run_or_skip(["apt-get", "install", "-qq", "--no-install-recommends", "--yes", *packages], settings)
+    with (cache_folder("apt") / "lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)  # apt does not wait for another suite's.
+        run_or_skip(["apt-get", "update", "-qq"])
+        run_or_skip(["apt-get", "install", "-qq", "--no-install-recommends", "--yes", *packages], settings)
 
 
 def run_or_skip(words: Sequence[str], settings: Mapping[str, str] | None = None, folder: Path | None = None) -> str:
