@@ -1,15 +1,12 @@
-"""The tables of docs/measurements.md come from stored figures, and the README's figures agree with them."""
+"""The tables of docs/measurements.md come from stored figures."""
 
 import re
 from pathlib import Path
 
-import pytest
-
-from feelahead.lab.measurements import ARMS, DOCUMENT, FIGURES, MARKED, TABLES, compared, read, written
+from feelahead.lab.measurements import DOCUMENT, MARKED, TABLES, written
 from feelahead.lab.table import Table
 from tests.helpers.repository import ROOT
 
-README = " ".join((ROOT / "README.md").read_text(encoding="utf-8").split())
 TEXT = DOCUMENT.read_text(encoding="utf-8")
 
 
@@ -65,25 +62,3 @@ def test_intervals_of_haptics_resample_seeds_and_not_trials(tmp_path: Path) -> N
     # Four pairs of two seeds: as wide as for one delay.
     assert lines[7].startswith("| **wall, all** | 2/4 at 100 (150) | 0/4 | 0/4 | 2 / 4 / 4 |")
     assert "| -12.5 [-25.0, +0.0] |" in lines[7]
-
-
-def test_the_readme_says_how_fast_overlaps_are_as_the_appendix_does() -> None:
-    appendix = (ROOT / "docs/benchmarks.md").read_text(encoding="utf-8")
-    times = re.findall(r"^\| times faster than the C\+\+ package.*? \| ([\d.]+) \|", appendix, re.MULTILINE)
-    assert len(times) == 2
-    assert f"at least {int(min(map(float, times)))} times as fast" in README
-
-
-def test_the_readme_says_what_haptics_change() -> None:
-    if not (FIGURES / "haptics.csv").exists():
-        pytest.skip("figures/haptics.csv is missing; make figures measures it")
-    trials = read("haptics")
-    ahead, shelf = (Table(row for row in trials if (row["scene"] == "shelf") is beside) for beside in (False, True))
-    of = len(ahead.where(arm="off"))
-    off, on, reacts = (sum(hits > 0 for hits in ahead.where(arm=arm).values("hits")) for arm in ARMS)
-    assert f"hits a wall or a post in {off} of {of} trials without haptics, and in {on} of {of} with them" in README
-    assert on == reacts
-    assert f"At a shelf none of {len(shelf.where(arm='off'))} trials hits anything" in README
-    assert sum(shelf.values("hits")) == 0
-    cost_s = [float(entry.split()[0]) for entry in [*compared(shelf)][5:7]]
-    assert "haptics cost {:.0f} to {:.0f} s".format(*cost_s) in README
