@@ -3,7 +3,9 @@
 The scripted person of a demo needs half a minute for the task, and then rests.
 """
 
-from collections.abc import Iterator, Sequence
+import functools
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
@@ -23,20 +25,26 @@ def chromium() -> Iterator[Browser]:
 
 
 @pytest.fixture(scope="module")
-def link(request: pytest.FixtureRequest) -> Sequence[str]:
+def link(request: pytest.FixtureRequest) -> tuple[str, ...]:
     """Arguments by which the demo emulates a link. A test module may set its own as `LINK`."""
     return getattr(request.module, "LINK", _LINK)
 
 
-@pytest.fixture(scope="module")
-def demo(link: Sequence[str]) -> Iterator[Run]:
-    """Demo that runs through all tests of a module."""
-    with running(link) as run:
-        yield run
+@pytest.fixture(scope="session")
+def demos() -> Iterator[Callable[[tuple[str, ...]], Run]]:
+    """Function that returns the demo with these arguments, started when it is first asked for."""
+    with ExitStack() as stack:
+        yield functools.cache(lambda arguments: stack.enter_context(running(arguments)))
 
 
 @pytest.fixture
-def fresh_demo(link: Sequence[str]) -> Iterator[Run]:
+def demo(demos: Callable[[tuple[str, ...]], Run], link: tuple[str, ...]) -> Run:
+    """Demo that runs through all tests with this link."""
+    return demos(link)
+
+
+@pytest.fixture
+def fresh_demo(link: tuple[str, ...]) -> Iterator[Run]:
     """Demo for one test, whose scripted person has just begun the task."""
     with running(link) as run:
         yield run
