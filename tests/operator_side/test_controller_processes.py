@@ -15,6 +15,7 @@ from typing import Any
 
 import pytest
 
+from common.clock import MonotonicClock
 from operator_side.controller.feel import FREE_TRIGGER, RELEASED, WARNING_LIGHT, Feel
 from operator_side.dualsense.reports.output_report import parse_output_report
 from tests.helpers.machines.waiting import LIMIT_S
@@ -37,10 +38,11 @@ class World:
         self.plug(plugged_in)
         self.source = StiffnessSource()
         self.source.state = "disarmed"
+        self.source.__enter__()
         self.process = subprocess.Popen(
             [
                 *(sys.executable, str(ROOT / "tests/helpers/plugged_operator.py"), str(folder)),
-                *(f"--connect={self.source.address}", f"--view-connect={self.source.view_address}"),
+                *(f"--connect={self.source.control}", f"--view-connect={self.source.view}"),
                 *("--status=json", *flags),
             ],
             stdout=subprocess.PIPE,
@@ -63,16 +65,19 @@ class World:
             marker.unlink(missing_ok=True)
 
     def until(self, condition: Callable[[], bool]) -> None:
-        """Run the stand-in for the robot side until `condition` is true."""
-        self._until(condition, lambda: self.source.run(0.02))
+        """Wait until `condition` is true, while the robot side sends stiffness."""
+        self._until(condition, silent=False)
 
     def until_in_silence(self, condition: Callable[[], bool]) -> None:
-        """Wait until `condition` is true, while the robot side sends nothing."""
-        self._until(condition, lambda: select.select([self._controller], [], [], 0.02))
+        """Wait until `condition` is true, while the robot side sends no stiffness."""
+        self._until(condition, silent=True)
 
-    def _until(self, condition: Callable[[], bool], go_on: Callable[[], object]) -> None:
-        for _ in range(round(LIMIT_S / 0.02)):
-            go_on()
+    def _until(self, condition: Callable[[], bool], *, silent: bool) -> None:
+        self.source.silent = silent
+        clock = MonotonicClock()
+        end_s = clock.now() + LIMIT_S
+        while clock.now() < end_s:
+            select.select([self._controller], [], [], 0.02)
             self._look()
             if condition():
                 return
@@ -87,7 +92,7 @@ class World:
 
     def stiffen(self) -> None:
         """Wait until the triggers are stiff."""
-        self.until(lambda: self.controller() == "connected" and self.source.connected)
+        self.until(lambda: self.controller() == "connected" and bool(self.source.payloads))
         self.source.state, self.source.r2 = "armed", 7
         self.until(self.is_stiff)
 
@@ -196,7 +201,7 @@ def test_they_are_released_when_the_robot_side_goes_silent(world: World) -> None
 
 def test_without_a_controller_it_says_so_and_commands_nothing_until_one_appears(tmp_path: Path) -> None:
     with World(tmp_path, plugged_in=False) as world:
-        world.until(lambda: world.source.hellos >= 5 and bool(world.notes()))
+        world.until(lambda: len(world.source.payloads) >= 5 and bool(world.notes()))
         [note] = world.notes()
         assert "no DualSense" in note
         assert "waiting for a controller" in note
@@ -248,7 +253,7 @@ def test_a_watchdog_that_ends_before_us_is_told_of_once_and_replaced(world: Worl
 
 def test_only_reading_starts_no_watchdog_and_writes_nothing(tmp_path: Path) -> None:
     with World(tmp_path, "--no-haptics") as world:
-        world.until(lambda: world.controller() == "connected" and world.source.connected)
+        world.until(lambda: world.controller() == "connected" and bool(world.source.payloads))
         children = Path(f"/proc/{world.process.pid}/task/{world.process.pid}/children").read_text()
         assert children == ""
         world.source.state, world.source.r2 = "armed", 7

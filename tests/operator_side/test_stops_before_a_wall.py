@@ -125,22 +125,6 @@ def test_a_finger_of_two_newtons_stops_at_the_same_place_whatever_the_link(delay
     assert approach.side.haptics.writes < 120
 
 
-@pytest.mark.parametrize("delay_ms", [0, 400])
-def test_a_finger_that_overcomes_the_strongest_effect_touches_slowly(delay_ms: int) -> None:
-    approach = begun(delay_ms)
-    speeds = approach.pull(3.0, 8.0)
-    touching = int(np.argmax(np.cumsum(speeds) * STEP_S >= AHEAD_M))
-    assert 0.0 < speeds[touching] < 0.04
-    assert speeds.max() > 0.2
-
-
-def test_by_the_robot_sides_reckoning_it_stops_too_while_the_link_is_quick() -> None:
-    approach = Approach(0.05, compensation="robot")
-    approach.pull(0.0, 1.0)
-    approach.pull(2.0, 8.0)
-    assert 2.0 < 1e3 * approach.left_m < 4.0
-
-
 @pytest.mark.parametrize(("delay_ms", "scale"), [(200, 1.0), (0, 0.5), (200, 0.25)])
 def test_at_any_speed_scale_it_stops_at_the_wall_and_is_never_faster_than_the_scale(
     delay_ms: int, scale: float

@@ -31,16 +31,6 @@ def free_port() -> int:
         return port
 
 
-def test_a_port_that_is_taken_is_said_before_anything_is_made_ready() -> None:
-    with socket.socket() as other:
-        other.bind(("127.0.0.1", 0))
-        other.listen()
-        port = other.getsockname()[1]
-        code, said, complaint = ended("-m", "robot_side", f"--bind=tcp://127.0.0.1:{port}")
-    assert (code, said) == (2, "")
-    assert f"--bind: cannot bind tcp://127.0.0.1:{port}: the port is in use" in complaint
-
-
 @pytest.mark.parametrize("flag", ["--arm", "--objects"])
 def test_a_driver_with_the_port_of_the_operators_is_named(flag: str) -> None:
     address = f"tcp://127.0.0.1:{free_port()}"
