@@ -13,7 +13,6 @@ from common.roles import Role
 from robot_side.overlap import Mesh
 from robot_side.surroundings import surroundings as module
 from robot_side.surroundings.blocks import TOGETHER
-from robot_side.surroundings.kinds.layout import BOX, HALF_SPACE, MESH, SPHERE, TETRAHEDRON
 from robot_side.surroundings.movers import Movers
 from robot_side.surroundings.perceived import PerceivedObjects
 from robot_side.surroundings.scene_table import SceneTable, make, scene_table
@@ -21,8 +20,7 @@ from robot_side.surroundings.surroundings import Surroundings
 from robot_side.surroundings.target import object_centers
 from robot_side.surroundings.validity import require_valid
 from tests.helpers.field.fields import along, ball_pose, look
-from tests.helpers.field.primitive_rows import object_bound
-from tests.helpers.field.primitive_rows import rows_of as rows_of_primitives
+from tests.helpers.field.primitive_rows import object_bound, rows_of
 from tests.helpers.meshes import CUBE_CORNERS, CUBE_TRIANGLES
 from tests.helpers.perceived_scenes import Scene, random_rotation, random_scene
 
@@ -34,21 +32,6 @@ def mixed() -> PerceivedObjects:
     scene.add(Role.IGNORED).add().half_space([0.0, 0.0, 1.0], -1.0)
     scene.add().box([2.0, 0.0, 0.0], [0.1, 0.1, 0.1]).sphere([2.0, 0.0, 0.3], 0.2)
     return scene.tetrahedron([[2.0, 0.0, 0.0], [2.1, 0.0, 0.0], [2.0, 0.1, 0.0], [2.0, 0.0, 0.3]]).objects()
-
-
-def rows_of(table: SceneTable, thing: int) -> range:
-    return range(int(table.first_rows[thing]), int(table.first_rows[thing + 1]))
-
-
-def test_the_rows_of_an_object_are_together_and_say_where_they_come_from() -> None:
-    table = scene_table(mixed())
-    kinds = [[int(table.kinds[row]) for row in rows_of(table, thing)] for thing in range(4)]
-    assert kinds == [[SPHERE, BOX, MESH], [], [HALF_SPACE], [SPHERE, BOX, TETRAHEDRON]]
-    assert [int(table.rows_of_kind[row]) for row in rows_of(table, 3)] == [1, 1, 0]
-    assert table.object_index.tolist() == [0, 0, 0, 2, 3, 3, 3]
-    assert table.flat == 0
-    volumes = [4 / 3 * np.pi * 0.1**3 + 8 * 0.1 * 0.2 * 0.3 + 0.2**3, 0.0, np.inf]
-    np.testing.assert_allclose(table.object_volumes, [*volumes, 0.2**3 + 4 / 3 * np.pi * 0.2**3 + 0.003 / 6])
 
 
 def test_what_has_no_volume_is_left_out_and_counted() -> None:
@@ -103,7 +86,7 @@ def frame_of(movers: Movers, objects: PerceivedObjects) -> PerceivedObjects:
 
 def assert_as_defined(table: SceneTable, objects: PerceivedObjects) -> None:
     """Assert that the table has the rows that follow from the definitions of primitives and objects."""
-    rows = rows_of_primitives(objects)
+    rows = rows_of(objects)
     of_thing = [[row for row in rows if row.thing == thing] for thing in range(len(objects.names))]
     same = partial(np.testing.assert_allclose, rtol=1e-12, atol=1e-12)
     assert [row.kind for row in rows] == table.kinds.tolist()

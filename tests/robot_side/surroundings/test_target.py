@@ -109,17 +109,12 @@ def test_there_is_no_other() -> None:
     assert following(balls(behind)) is None
 
 
-@pytest.mark.parametrize("role", [Role.SUPPORT, Role.IGNORED])
-def test_supports_and_what_is_ignored_are_never_chosen(role: Role) -> None:
-    objects = balls(([0.0, 0.0, 0.1], role), ([0.0, 0.0, 0.3], Role.TARGET), ([0.0, 0.0, 0.4], Role.OBSTACLE))
-    assert following(objects) == "object2"
-    assert following(balls(([0.0, 0.0, 0.1], role), ([0.0, 0.0, 0.3], Role.TARGET))) is None
-
-
-def test_a_half_space_is_never_chosen() -> None:
-    scene = Scene().add().half_space(AHEAD, 5.0).add().sphere([0.0, 0.0, 0.3], 0.1)
-    assert following(scene.objects()) == "object1"
-    assert following(Scene().add().half_space(AHEAD, 5.0).objects()) is None
+@pytest.mark.parametrize("role", [Role.SUPPORT, Role.IGNORED, None])
+def test_supports_what_is_ignored_and_half_spaces_are_never_chosen(role: Role | None) -> None:
+    scene = Scene()
+    scene.add().half_space(AHEAD, 5.0) if role is None else scene.add(role).sphere([0.0, 0.0, 0.1], 0.01)
+    assert following(scene.add(Role.TARGET).sphere([0.0, 0.0, 0.3], 0.01).objects()) is None
+    assert following(scene.add().sphere([0.0, 0.0, 0.4], 0.01).objects()) == "object2"
 
 
 @pytest.mark.parametrize("order", list(itertools.permutations(["near", PLANE, "middle", "far"])))
