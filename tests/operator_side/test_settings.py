@@ -27,6 +27,12 @@ def test_what_is_checked_by_hand_is_named_with_what_is_valid(kind: type, name: s
             kind(**{name: value})
 
 
+def test_a_stick_that_rests_aside_has_a_smaller_dead_zone() -> None:
+    StickRest(x=0.12, y=-0.16, dead_zone=0.79)
+    with pytest.raises(ValueError, match="dead_zone = 0.81; valid: 0 to below 0.8"):
+        StickRest(x=0.12, y=-0.16, dead_zone=0.81)
+
+
 def test_a_file_sets_everything_and_flags_win(tmp_path: Path) -> None:
     usual = OperatorSettings()
     assert (usual.device, usual.connect, usual.compensation) == ("hid", "tcp://127.0.0.1:5555", "operator")

@@ -1,6 +1,7 @@
 """The way home: straight in joint space, only while asked for, and only where it is free as perceived."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -81,13 +82,13 @@ def ball_at(center_m: FloatArray, role: Role = Role.OBSTACLE) -> PerceivedObject
 FAR_M = np.array([0.0, 0.0, 9.0])
 
 
-def moved_away(camera: Seen) -> tuple[Bench, FloatArray]:
-    """Return a bench whose arm has moved back, and where the tool was at the start."""
+def moved_away(camera: Seen, duration_s: float = 0.6, **asked: Any) -> tuple[Bench, FloatArray]:
+    """Return a bench whose arm has moved back, or as `asked`, and where the tool was at the start."""
     bench = Bench(parts=replace(build_parts(QUICK, 1, "clock"), camera=camera, truth=None))
     operator = bench.join(2)
     bench.arm_it(operator)
     start_m = bench.tool_m
-    bench.drive(0.6, operator, l2=0.8)
+    bench.drive(duration_s, operator, **(asked or {"l2": 0.8}))
     bench.drive(0.3, operator)
     return bench, start_m
 
@@ -114,6 +115,16 @@ def test_an_object_on_the_way_refuses_it_whatever_its_role_until_it_is_asked_for
     assert not operator.felt[-1].hindered
     bench.drive(0.5, operator, home=1.0)
     assert off_rad(bench) < begun_rad - 0.05
+
+
+def test_an_object_half_way_refuses_it_though_both_ends_are_free() -> None:
+    camera = Seen(ball_at(FAR_M))
+    bench, start_m = moved_away(camera, 3.0, lateral=(0.0, 1.0))
+    [operator], begun_rad = bench.operators.values(), off_rad(bench)
+    camera.objects = ball_at(0.5 * (start_m + bench.tool_m))
+    bench.drive(0.5, operator, home=1.0)
+    assert off_rad(bench) == pytest.approx(begun_rad, abs=5e-3)
+    assert bench.robot.status(bench.now_s).hindrance is not None
 
 
 def test_an_object_where_a_link_would_come_refuses_it_and_one_beside_the_base_does_not() -> None:

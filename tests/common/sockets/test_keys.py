@@ -77,6 +77,22 @@ def test_a_key_is_never_replaced_by_accident(folder: KeyFolder) -> None:
     assert folder.secret("robot") == KEY
 
 
+def test_what_cannot_be_written_is_named_and_no_half_a_key_stays(
+    folder: KeyFolder, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder.secret_path("robot").mkdir(parents=True)
+    with pytest.raises(ConfigurationError, match=r"robot.secret: cannot be written: Is a directory"):
+        folder.write_pair("robot", KEY, OTHER, replace=True)
+    assert list(folder.path.iterdir()) == [folder.secret_path("robot")]
+
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(os, "open", full)
+    with pytest.raises(ConfigurationError, match=r"operator.secret: cannot be written: No space left"):
+        folder.write_pair("operator", KEY, OTHER)
+
+
 def test_peers_come_and_go(folder: KeyFolder) -> None:
     assert folder.allowed() == {}
     folder.allow("anna", KEY)

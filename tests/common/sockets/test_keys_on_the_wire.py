@@ -11,7 +11,7 @@ import zmq
 
 from common.clock import MonotonicClock
 from common.sockets.allow_list import AllowList
-from common.sockets.authentication import OperatorKeys, RobotKeys, make_key_pair, public_part
+from common.sockets.authentication import Authenticator, OperatorKeys, RobotKeys, make_key_pair, public_part
 from common.sockets.keys import KeyFolder
 from common.sockets.operator import OperatorSockets
 from common.sockets.robot import RobotSockets
@@ -105,6 +105,23 @@ def test_an_unknown_key_gets_nothing_and_both_sides_say_what_to_do(robot: Robot)
     [told] = robot.sockets.news()
     assert f"feelahead keys allow NAME {public} --folder {robot.folder.path}" in told
     assert robot.sockets.news() == []
+
+
+def test_each_refused_key_is_told_once_and_of_a_flood_only_the_first(tmp_path: Path) -> None:
+    with zmq.Context() as context, context.socket(zmq.REQ) as part:
+        authenticator = Authenticator(context, AllowList(KeyFolder(tmp_path)))
+        part.connect("inproc://zeromq.zap.01")
+
+        def ask(number: int, mechanism: bytes = b"CURVE", domain: bytes = b"feelahead") -> int:
+            part.send_multipart([b"1.0", b"1", domain, b"", b"", mechanism, bytes([number]) * 32])
+            authenticator.serve()
+            assert part.recv_multipart()[2] == b"400"
+            return len(authenticator.news())
+
+        asked = [ask(1, mechanism=b"PLAIN"), ask(1, domain=b"another"), ask(1), ask(1), *map(ask, range(100))]
+        assert asked == [0, 0, 1, 0, 1, 0] + [1] * 62 + [0] * 36
+        assert authenticator.refused == 104
+        context.destroy(linger=0)
 
 
 def test_a_key_that_is_allowed_later_gets_in_without_a_restart(robot: Robot) -> None:
@@ -222,8 +239,12 @@ def test_a_view_that_cannot_be_reopened_is_tried_again(robot: Robot, monkeypatch
 def test_a_broken_allow_list_lets_nobody_stay(robot: Robot) -> None:
     with robot.operator("anna") as anna:
         assert gets_in(robot, anna)
+        assert anna.send(b"motion")
+        assert robot.sockets.wait(PATIENT_S)
         robot.folder.allowed_path.chmod(0o777)
         robot.sockets.refresh_keys()
+        assert robot.sockets.receive() == []
+        assert robot.sockets.revoked > robot.sockets.flooding == 0
         exchange(robot, anna, 0.05, until_both=False)
         assert exchange(robot, anna, 0.2, until_both=False).at_robot == []
         assert any("nobody is let in any more" in text and "chmod 700" in text for text in robot.sockets.news())

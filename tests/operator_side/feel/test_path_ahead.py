@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from common.arrays import FloatArray
 from common.following import follow_together
 from common.protocol.around import AXES, LISTS, PROBES, Around
-from common.protocol.messages import Header, MotionCommand, StiffnessUpdate
+from common.protocol.messages import Compensation, Header, MotionCommand, StiffnessUpdate
 from common.protocol.uniform_field import FAR_M, uniform_field
 from common.reaction import HORIZON_S
 from operator_side.controller.feel import ZONE_COUNT
@@ -196,8 +196,8 @@ def message(sent_s: float, commanded: Around | None, epoch: int = 1, **changes: 
     return msgspec.structs.replace(update, **changes)
 
 
-def haptics() -> Haptics:
-    made = Haptics(RenderingSettings(), TravelCalibration(), enabled=True, swap_sides=False, compensation="operator")
+def haptics(compensation: Compensation = "operator") -> Haptics:
+    made = Haptics(RenderingSettings(), TravelCalibration(), enabled=True, swap_sides=False, compensation=compensation)
     for number in range(101):
         made.commanded(MotionCommand(Header(9, number, 0.004 * number), 0.0, 0.8, lateral=(1.0, 0.0), run=True))
     return made
@@ -226,10 +226,8 @@ def test_the_newest_map_holds_until_it_is_old_or_another_robot_side_speaks() -> 
 
 def test_without_a_map_or_where_the_robot_side_reckons_nothing_is_traced() -> None:
     assert strengths(haptics(), message(0.3, None)) == (0,) * ZONE_COUNT
-    reckons = Haptics(RenderingSettings(), TravelCalibration(), enabled=True, swap_sides=False, compensation="robot")
-    for number in range(101):
-        reckons.commanded(MotionCommand(Header(9, number, 0.004 * number), 0.0, 0.8, lateral=(1.0, 0.0), run=True))
-    assert strengths(reckons, message(0.3, around(dict.fromkeys(RIGHT_ACROSS, 0.03)))) == (0,) * ZONE_COUNT
+    commanded = around(dict.fromkeys((*RIGHT_ACROSS, 0), 0.03))
+    assert strengths(haptics("robot"), message(0.3, commanded)) == (0,) * ZONE_COUNT
 
 
 def test_a_path_is_traced_once_for_each_write_and_at_once_for_a_new_map() -> None:

@@ -163,3 +163,16 @@ def test_a_spoilt_command_of_the_owner_is_rejected_whole_and_counted() -> None:
         bench.robot.receive(operator.peer, msgpack.packb([version, content]), bench.now_s)
         assert bench.robot.session.safety.command is last
     assert bench.robot.session.rejected == len(spoilt)
+
+
+def test_the_delay_of_driving_is_that_of_each_command_of_the_armed_owner() -> None:
+    bench, operator = cruising()
+    observer, delays = bench.join(3, b"observer"), bench.robot.session.driving_delay
+    before = delays.count
+    payload = bench.send(operator)
+    bench.robot.receive(operator.peer, payload, bench.now_s)
+    bench.send(observer)
+    assert delays.count == before + 1
+    bench.silence(T_S + 0.1)
+    bench.send(operator)
+    assert (bench.state, delays.count) == ("disarmed", before + 1)

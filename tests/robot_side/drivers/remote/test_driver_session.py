@@ -96,18 +96,20 @@ def test_one_stale_state_over_and_over_keeps_no_arm_alive_and_is_told_once_a_sec
     assert len(desk.notes) <= 4
 
 
-def test_a_driver_that_restarts_begins_anew_with_another_clock() -> None:
+@pytest.mark.parametrize(("peer", "sequence"), [(b"another", 0), (b"another", 10**6), (b"driver", 0)])
+def test_a_driver_that_restarts_begins_anew_with_another_clock(peer: bytes, sequence: int) -> None:
     desk = DriverDesk()
     desk.run(1.5)
     desk.speaks = False
     desk.run(1.5)
-    desk.peer, desk.sequence, desk.newest, desk.speaks = b"another", 0, None, True
+    desk.peer, desk.sequence, desk.newest, desk.speaks = peer, sequence, None, True
     desk.also = {"sent_s": 3.0, "measured_s": 3.0}
     desk.say()
     desk.also = {}
     desk.run(0.3)
     assert desk.age_s() < 0.02
     assert desk.notes.count("driver: connected") == 2
+    assert not desk.arm.session.rejected
 
 
 def test_a_second_driver_is_refused_and_hears_why() -> None:
