@@ -29,7 +29,7 @@ def test_what_is_checked_by_hand_is_named_with_what_is_valid(kind: type, name: s
 
 def test_a_stick_that_rests_aside_has_a_smaller_dead_zone() -> None:
     StickRest(x=0.12, y=-0.16, dead_zone=0.79)
-    with pytest.raises(ValueError, match="dead_zone = 0.81; valid: 0 to below 0.8"):
+    with pytest.raises(ValueError, match=r"dead_zone = 0\.81; valid: 0 to below 0\.8"):
         StickRest(x=0.12, y=-0.16, dead_zone=0.81)
 
 

@@ -28,14 +28,6 @@ def test_an_asymmetry_that_is_known_costs_nothing() -> None:
     assert abs(error_s(offset, clock, end_s)) < 0.1e-3
 
 
-@pytest.mark.parametrize("skew", [0.0, 20e-6, -100e-6, 500e-6])
-def test_queues_leave_the_offset(skew: float) -> None:
-    generator, clock = np.random.default_rng(8), ahead(1234.5, skew)
-    offset = ClockOffset(shared_clock=False)
-    end_s = talk(offset, clock, 0.050 + generator.exponential(0.010, 1250), 0.050 + generator.exponential(0.001, 1250))
-    assert abs(error_s(offset, clock, end_s)) < 0.5e-3
-
-
 # Shared clocks, and clocks that jump
 
 

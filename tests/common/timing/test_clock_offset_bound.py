@@ -29,7 +29,7 @@ def test_the_bound_is_never_violated_whatever_the_delays_and_the_drift(
         if not lost:
             offset.update(start_s, peer_sent_s, peer_sent_s - peer_received_s, now_s)
             one_way_s = offset.one_way_from_peer_s(peer_sent_s, now_s)
-            assert one_way_s is None or one_way_s >= -1e-9
+            assert one_way_s is None or one_way_s >= -1e-8  # A clock far apart is rounded.
         now_s, peer_s = now_s + pause_s, peer_s + rate * pause_s
         estimate_s, bound_s = offset.offset_at(now_s), offset.bound_at(now_s)
         if estimate_s is not None and bound_s is not None:
