@@ -87,9 +87,11 @@ def _weak(scene: Scene) -> list[str]:
 
 def _grip(scene: Scene, travel: GripperTravel | None) -> list[str]:
     """Return a line if nothing can be gripped, or not the target."""
-    if travel is None:
+    if travel is None or not travel.feels:
         why = "no actuator opens and closes fingers beyond the arm's last joint"
-        if scene.robot.gripper_actuators.size:
+        if travel is not None:
+            why = "the hand's own parts resist its drive as much as an object could" + _filled(scene)
+        elif scene.robot.gripper_actuators.size:
             why = "the hand's actuators do not bring its fingers together over the whole of their ctrlrange"
             why += _filled(scene)
         return [f"{why}: nothing can be grasped"]

@@ -7,13 +7,15 @@ import numpy as np
 
 from common.arrays import FloatArray, IntArray
 from robot_side.compiled.kernel import building_block, inlined
-from robot_side.drivers.mujoco.hand.gripper_measurement import LEAD, NOTHING_M, GripperTravel
+from robot_side.drivers.mujoco.hand.gripper_measurement import (
+    LEAD,
+    NOTHING_M,
+    STANDING_SPEED_1_S,
+    STANDING_TIME_S,
+    GripperTravel,
+)
 from robot_side.drivers.mujoco.hand.gripper_sweep import SPEED_TIME_CONSTANT_S, STROKE_TIME_S
 
-# Something stops the fingers if they rest although the drive leads by more than the gripper itself resists. They rest
-# if they move slower than this share of the stroke per second, for this time.
-_STANDING_SPEED_1_S = 0.05
-_STANDING_TIME_S = 0.05
 # Fingers that hold something may follow its slip. If they close faster than this share of their free speed, it is gone.
 _LOST_SHARE = 0.5
 
@@ -118,7 +120,7 @@ class GripperDrive:
         Never where they stop by themselves: at the gap of the closed gripper, or where it hinders itself.
         """
         apart_m = self._opening_m[0] - self._travel.openings_m[-1]
-        return bool(self._standing_s[0] >= _STANDING_TIME_S and apart_m > NOTHING_M)
+        return bool(self._standing_s[0] >= STANDING_TIME_S and apart_m > NOTHING_M)
 
 
 @inlined
@@ -156,7 +158,7 @@ def advance_gripper(
         gripper.reference = min(max(moved, gripper.least), gripper.most)
 
     resisted = gripper.reference - free - gripper.lag_s * gripper.speed > _at_closure(samples, closure, 3)
-    follows = gripper.standing_s >= _STANDING_TIME_S and gripper.speed * gripper.stroke_time_s < _LOST_SHARE
-    standing = abs(gripper.speed) < _STANDING_SPEED_1_S or follows
+    follows = gripper.standing_s >= STANDING_TIME_S and gripper.speed * gripper.stroke_time_s < _LOST_SHARE
+    standing = abs(gripper.speed) < STANDING_SPEED_1_S or follows
     stopped = resisted and standing and gripper.told_to_close == 1
     gripper.standing_s = gripper.standing_s + step_s if stopped else 0.0

@@ -6,6 +6,7 @@ from typing import Any, Final
 
 import mujoco  # type: ignore[import-untyped]
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from common.arrays import FloatArray, IntArray
 from common.errors import ConfigurationError
@@ -20,8 +21,9 @@ NOTHING_M: Final = 1e-3
 """Gap beyond that of the closed gripper up to which nothing is held"""
 _RESISTS: Final = 0.02
 """Least lead of the reference over a free drive, as a share of the stroke, at which something resists"""
-_CREEPS_1_S: Final = 0.2
-"""Speed of the closure, in 1/s, up to which fingers may soon stand"""
+STANDING_TIME_S: Final = 0.05
+STANDING_SPEED_1_S: Final = 0.05
+"""Speed of the closure, in 1/s, below which the fingers rest, if they do so for the standing time"""
 _SAFELY: Final = 1.5
 """Factor for what the gripper itself resists, which differs from time to time"""
 _FLAT: Final = 1e-3
@@ -65,6 +67,11 @@ class GripperTravel:
     closing: FloatArray
     """(3,) direction in the frame of the tool's site along which the jaws close, from the first jaw to the second"""
     jaws: tuple[Jaw, Jaw]
+
+    @property
+    def feels(self) -> bool:
+        """Whether the drive's lead can tell an object from what the gripper itself resists, somewhere in the travel."""
+        return bool((self.resists < min(LEAD, self.force_lead)).any())
 
 
 def measure_gripper(scene: Simulated) -> GripperTravel | None:
@@ -169,7 +176,7 @@ def rising(closures: FloatArray) -> IntArray:
 def resistance(
     run: ClosingRun, references: FloatArray, closures: FloatArray, openings_m: FloatArray
 ) -> tuple[float, FloatArray]:
-    """Return the drive's lag in seconds, and how far (k,) fingers that creep lag beyond it at the samples, in `run`.
+    """Return the drive's lag in seconds, and how far (k,) fingers that rest lag beyond it at the samples, in `run`.
 
     references, closures, openings_m (k,): the samples, at rest.
     """
@@ -177,11 +184,13 @@ def resistance(
     fast = (run.speeds > 0.5 * run.speeds.max()) & (run.closures > 0.1) & (run.closures < 0.9)
     lag_s = max(float(np.median(behind[fast] / run.speeds[fast])), 0.0) if fast.any() else 0.0
     open_m = np.interp(run.closures, closures, openings_m)
-    creeps = (run.speeds < _CREEPS_1_S) & (open_m > openings_m[-1] + NOTHING_M)
-    more, at = (behind - lag_s * run.speeds)[creeps], run.closures[creeps]
+    alone = (np.abs(run.speeds) < 2.0 * STANDING_SPEED_1_S) & (open_m > openings_m[-1] + NOTHING_M)
+    # For as long as fingers have to rest; they also rest as they begin to move.
+    steps = round(STANDING_TIME_S / run.step_s)
+    lasts = sliding_window_view(np.where(alone, behind - lag_s * run.speeds, 0.0), steps).min(axis=1)
     # Each sample stands for the travel on both of its sides.
-    from_to = zip([-np.inf, *closures[:-1]], [*closures[1:], np.inf], strict=True)
-    return lag_s, np.array([more[(at >= low) & (at <= high)].max(initial=0.0) for low, high in from_to])
+    at, from_to = run.closures[steps - 1 :], zip([-np.inf, *closures[:-1]], [*closures[1:], np.inf], strict=True)
+    return lag_s, np.array([lasts[(at >= low) & (at <= high)].max(initial=0.0) for low, high in from_to])
 
 
 def open_gap(scene: Simulated, cover: GripperCover) -> tuple[float, float] | None:

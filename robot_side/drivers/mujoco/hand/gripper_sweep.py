@@ -21,6 +21,9 @@ _SHORTEST_SETTLING_S, _LONGEST_SETTLING_S = 0.05, 2.0
 _RESTING: Final = 1e-3
 """Speed of a finger's joint, in rad/s or m/s, below which it rests"""
 _RESTED_S: Final = 0.02
+_SWING_S: Final = 0.4
+_TURNS: Final = 4
+"""Number of turns within that time from which on fingers swing"""
 _UNMOVED: Final = 0.01
 """Share of an actuator's travel up to which inputs have moved nothing"""
 _EVEN: Final = 0.75
@@ -31,6 +34,9 @@ _FINE: Final = 1.0 / 32.0
 
 _AFTER_S: Final = 0.4
 """Time after the last input of a run, in which slow fingers may arrive"""
+_PAUSES: Final = (0.25, 0.5, 0.75)
+"""Inputs of a run at which it pauses, as a person may"""
+_PAUSE_S: Final = 0.2
 _SMALLEST: Final = 1e-6
 """Change of an actuator's length, in its own unit, below which its inputs move nothing"""
 
@@ -51,14 +57,12 @@ class GripperSweep:
 
     @property
     def per_length(self) -> FloatArray:
-        """(g,) weights with which the actuators' lengths add up to a position, 0 at the first sample and 1 at the last.
+        """(g,) weights with which changes of the lengths add up to a position, 0 at the first sample and 1 at the last.
 
-        0 for an actuator that moves nothing.
+        An actuator that moves little counts little.
         """
-        way = self.lengths[-1] - self.lengths[0]
-        moves = np.abs(way) > _SMALLEST
-        weights: FloatArray = np.divide(1.0, way * max(moves.sum(), 1), out=np.zeros_like(way), where=moves)
-        return weights
+        way: FloatArray = self.lengths[-1] - self.lengths[0]
+        return way / max(float(way @ way), _SMALLEST**2)
 
 
 class ClosingRun(NamedTuple):
@@ -70,6 +74,7 @@ class ClosingRun(NamedTuple):
     """(n,) positions from 0 to 1"""
     speeds: FloatArray
     """(n,) rates of the closures, averaged, in 1/s"""
+    step_s: float
 
 
 class EmptySpace:
@@ -110,18 +115,23 @@ class EmptySpace:
     def settle(self, control: FloatArray) -> Any:
         """Let the fingers come to rest at `control` (g,); return their state, an MjData, within the joints' ranges.
 
-        Limits are soft: strong inputs push a joint beyond its range.
+        Limits are soft: strong inputs push a joint beyond its range. Fingers that swing on and on are at their mean.
         """
-        timestep_s, rested_s = self.model.opt.timestep, 0.0
+        places, timestep_s, rested_s = self.robot.finger_positions, float(self.model.opt.timestep), 0.0
+        recent = np.zeros((round(_SWING_S / timestep_s), places.size))
         for step in range(round(_LONGEST_SETTLING_S / timestep_s)):
             self.step(control)
+            at = recent[step % len(recent)] = self.data.qpos[places]
             # Fingers that swing stand for a moment, too.
             rested_s = rested_s + timestep_s if self.rests else 0.0
             if rested_s > _RESTED_S and step * timestep_s > _SHORTEST_SETTLING_S:
                 break
-        within, places = self._within, self.robot.finger_positions
+            if (step + 1) % len(recent) == 0 and _swings(recent):
+                at = recent.mean(axis=0)
+                break
+        within = self._within
         within.qpos[:] = self.data.qpos
-        within.qpos[places] = np.clip(within.qpos[places], self._lower, self._upper)
+        within.qpos[places] = np.clip(at, self._lower, self._upper)
         mujoco.mj_kinematics(self.model, within)
         mujoco.mj_comPos(self.model, within)
         mujoco.mj_tendon(self.model, within)
@@ -153,7 +163,7 @@ class EmptySpace:
         return GripperSweep(controls, np.array(fingers), np.array(lengths), poses, max(ahead_m[0], ahead_m[-1]))
 
     def close(self, sweep: GripperSweep, most: float, lag_s: float, force_lead: float) -> ClosingRun:
-        """Close on nothing by inputs that rise from open (0) to closed (1), and on to `most`, at full speed.
+        """Close on nothing by inputs that rise from open (0) to closed (1), and on to `most`, with pauses.
 
         sweep: from open to closed. The reference leads the fingers by what their speed, times `lag_s`, and the largest
         force, at `force_lead`, need, as in `advance_gripper`.
@@ -162,10 +172,14 @@ class EmptySpace:
         timestep_s, samples = float(self.model.opt.timestep), []
         way, weights = sweep.controls[-1] - sweep.controls[0], sweep.per_length
         closures = (sweep.lengths - sweep.lengths[0]) @ weights
+        rise, pause = timestep_s / STROKE_TIME_S, round(_PAUSE_S / timestep_s)
+        told = np.minimum(np.arange(round((most * STROKE_TIME_S + _AFTER_S) / timestep_s)) * rise, most)
+        for at in _PAUSES:
+            told = np.insert(told, np.searchsorted(told, at), np.full(pause, at))
         reference = closure = speed = 0.0
-        for _ in range(round((most * STROKE_TIME_S + _AFTER_S) / timestep_s)):
+        for moved in np.diff(told):
             free = float(np.interp(closure, closures, np.linspace(0.0, 1.0, _SAMPLES)))
-            reference = min(reference + timestep_s / STROKE_TIME_S, free + lag_s * speed + force_lead, most)
+            reference = min(reference + moved, free + lag_s * speed + force_lead) if moved > 0.0 else reference
             self.step(sweep.controls[0] + reference * way)
             lengths, rates = (
                 values[self.actuators] for values in (self.data.actuator_length, self.data.actuator_velocity)
@@ -173,7 +187,8 @@ class EmptySpace:
             closure = float((lengths - sweep.lengths[0]) @ weights)
             speed += (float(rates @ weights) - speed) * min(timestep_s / SPEED_TIME_CONSTANT_S, 1.0)
             samples.append((reference, closure, speed))
-        return ClosingRun(*np.array(samples).T)
+        references, run, speeds = np.array(samples).T
+        return ClosingRun(references, run, speeds, timestep_s)
 
     def sag(self, sweep: GripperSweep) -> float:
         """Return by how much the fingers' weight moves them at most, halfway, as a share of their travel."""
@@ -208,6 +223,14 @@ class EmptySpace:
                     near[int(abs(at[one] - lengths[0, one]) > moved[one])] = share
                 if far[0] < share < far[1]:
                     far[int(abs(at[one] - lengths[-1, one]) <= moved[one])] = share
+
+
+def _swings(recent: FloatArray) -> bool:
+    """Return whether that finger whose positions (n, f) change most turns round often, and as far as before."""
+    widest = recent[:, np.ptp(recent, axis=0).argmax()]
+    first, second = (float(np.ptp(half)) for half in np.array_split(widest, 2))
+    turns = np.count_nonzero(np.diff(np.sign(np.diff(widest))))
+    return bool(second > 0.5 * first and turns >= _TURNS)
 
 
 def _dead(shares: FloatArray, lengths: FloatArray) -> FloatArray:

