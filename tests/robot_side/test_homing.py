@@ -121,10 +121,15 @@ def test_an_object_half_way_refuses_it_though_both_ends_are_free() -> None:
     camera = Seen(ball_at(FAR_M))
     bench, start_m = moved_away(camera, 3.0, lateral=(0.0, 1.0))
     [operator], begun_rad = bench.operators.values(), off_rad(bench)
-    camera.objects = ball_at(0.5 * (start_m + bench.tool_m))
+    half_way_m = 0.5 * (start_m + bench.tool_m)
+    camera.objects = ball_at(half_way_m)
     bench.drive(0.5, operator, home=1.0)
     assert off_rad(bench) == pytest.approx(begun_rad, abs=5e-3)
     assert bench.robot.status(bench.now_s).hindrance is not None
+    bench.drive(0.1, operator)
+    camera.objects = ball_at(half_way_m + [0.2, 0.0, 0.0])  # nearer than half of the way is long
+    bench.drive(0.5, operator, home=1.0)
+    assert off_rad(bench) < begun_rad - 0.05
 
 
 def test_an_object_where_a_link_would_come_refuses_it_and_one_beside_the_base_does_not() -> None:
