@@ -81,3 +81,11 @@ def cup() -> tuple[FloatArray, IntArray]:
     triangles = surface_of(tetrahedra[~mouth])
     used, numbers = np.unique(triangles, return_inverse=True)
     return CELL_M * (places[used] - 1.5), numbers.reshape(-1, 3)
+
+
+def hollow_cube() -> tuple[FloatArray, IntArray]:
+    """Return vertices and triangles of a cube of 90 mm with a cubic cavity of 30 mm in its middle."""
+    places, tetrahedra = grid_tetrahedra(3)
+    middle = (np.floor(places[tetrahedra].mean(axis=1)) == 1.0).all(axis=1)
+    used, numbers = np.unique(surface_of(tetrahedra[~middle]), return_inverse=True)
+    return 0.03 * (places[used] - 1.5), numbers.reshape(-1, 3)

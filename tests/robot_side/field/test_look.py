@@ -73,13 +73,6 @@ def test_the_enlargement_is_eq_10_for_each_sphere(
     assert along_m[Error.EXPECTED] == pytest.approx(max(0.0, mean_m + mean_along_m), rel=1e-15)
 
 
-def test_the_largest_of_the_enlargements_is_told() -> None:
-    # The second joint turns the tool about y: points farther out along x have larger errors along z.
-    pose = free_pose([[0.01, 0.0, 0.0], [0.3, 0.0, 0.0]], [0.01, 0.01])
-    by = Ahead(np.array([0.0, 0.0, 0.0, 0.0, 1e-2, 0.0]))
-    assert look(pose, EMPTY, along(AHEAD, 0.001, quantile=2.0), by=by).sigma_m == pytest.approx(0.001 + 2.0 * 3e-3)
-
-
 @pytest.mark.parametrize("p", [0.9, 0.99])
 def test_it_covers_the_drawn_errors_with_probability_p(p: float) -> None:
     """Draw the true positions of gripper and object many times: in a share P the gap is smaller by at most D_σ."""

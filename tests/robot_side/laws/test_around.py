@@ -145,24 +145,6 @@ def test_at_rest_nothing_is_looked_at_from_around_and_in_motion_one_look_a_tick(
     assert moving - resting == pytest.approx(PROBES * (1.0 + 0.25) / PERIOD_S, rel=0.1)
 
 
-def test_what_matters_sooner_is_never_late_for_it(law: SweptLaw) -> None:
-    drifting = np.array([0.1, 0.0, 0.2, 0.0, 0.0, 0.0])
-    looks(law, 100, drifting, 0.0)
-    for tick in range(300):
-        now_s = 0.1 + 1e-3 * tick
-        looks(law, 1, drifting, now_s)
-        assert now_s - law.memory.looked_s[:2, 0].min() < 0.02
-
-
-def test_changed_roles_or_p_cause_new_looks(law: SweptLaw) -> None:
-    looks(law, 300, np.zeros(6), 0.0)
-    law.expect(0.5)
-    assert looks(law, 500, np.zeros(6), 0.3) > 100 + PROBES
-    told = told_by(law, ball_pose())
-    assert told is not None
-    assert told.r2_m[0] == pytest.approx(0.1, abs=3e-3)
-
-
 def test_what_has_just_appeared_straight_ahead_is_in_the_next_map(law: SweptLaw) -> None:
     looks(law, 300, np.zeros(6), 0.0)
     for tick in range(30):

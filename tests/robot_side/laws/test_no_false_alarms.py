@@ -2,24 +2,18 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from common.arrays import FloatArray
-from common.roles import Role
 from robot_side.overlap import Mesh
 from robot_side.surroundings.perceived import PerceivedObjects
 from tests.helpers.field.fields import AHEAD, RADIUS_M, along, ball_pose, look, ways_of
-from tests.helpers.gripper_poses import free_pose, gripper_pose
+from tests.helpers.gripper_poses import gripper_pose
 from tests.helpers.meshes import CUBE_CORNERS, CUBE_TRIANGLES, grid_tetrahedra
 from tests.helpers.perceived_scenes import Scene, random_rotation
 
 INFLATED_M = 0.007
 GRIPPER = gripper_pose()
 SIDE_M = float((GRIPPER.sphere_centers_m[:, 0] + GRIPPER.sphere_radii_m).max())
-ALONG_X = np.array([1.0, 0.0, 0.0])
-seeds = st.integers(0, 2**32 - 1)
-repeatable = settings(derandomize=True, deadline=None, max_examples=40)
 
 
 def bench(made_of: str, top_m: float, rotation: FloatArray) -> PerceivedObjects:
@@ -57,41 +51,6 @@ def test_along_a_bench_there_is_no_way_however_it_is_told(made_of: str, gap_m: f
         found = look(pose, objects, along(rotation @ direction, INFLATED_M))
         assert np.isinf(found.fast_m).all()
         assert np.isinf(found.slow_m).all()
-
-
-@pytest.mark.parametrize("made_of", MADE_OF[1:])
-@pytest.mark.parametrize("gap_m", [0.0, 0.003, 0.01, 0.05])
-@pytest.mark.parametrize("degrees", [0, 20, 60])
-def test_towards_a_bench_all_ways_are_equal_however_it_is_told(made_of: str, gap_m: float, degrees: int) -> None:
-    rotation = random_rotation(np.random.default_rng(4))
-    pose = gripper_pose((0.0, 0.0, 0.0), rotation)
-    angle = np.radians(degrees)
-    looked = along(rotation @ (np.cos(angle) * ALONG_X + np.sin(angle) * AHEAD), INFLATED_M)
-    whole = ways_of(pose, bench("1 box", SIDE_M + gap_m, rotation), looked)
-    assert np.isfinite(whole).all()
-    np.testing.assert_allclose(ways_of(pose, bench(made_of, SIDE_M + gap_m, rotation), looked), whole, atol=1e-4)
-
-
-@repeatable
-@given(seed=seeds, gap_m=st.floats(0.0, 0.03))
-def test_surfaces_beside_the_way_are_not_felt_in_either_direction(seed: int, gap_m: float) -> None:
-    """Planes, boxes and rods lie along the path on all sides, and the gripper just fits between them."""
-    rng = np.random.default_rng(seed)
-    scene, width_m = Scene(), float(rng.uniform(0.005, 0.05))
-    for _ in range(5):
-        angle = float(rng.uniform(0.0, 2.0 * np.pi))
-        away = np.array([np.cos(angle), np.sin(angle), 0.0])
-        turned = np.stack([away, np.cross(AHEAD, away), AHEAD], axis=1)
-        nearest = width_m + gap_m
-        scene.add().half_space(-away, -nearest)
-        half = np.array([*rng.uniform(0.001, 0.05, 2), 1.0])
-        scene.add().box((nearest + half[0]) * away, half, turned)
-    # Every sphere just touches the cylinder of the gripper's width from inside, anywhere along it.
-    angles, radii = rng.uniform(0.0, 2.0 * np.pi, 6), rng.uniform(0.3, 1.0, 6) * width_m
-    centers = np.stack([np.cos(angles), np.sin(angles), np.zeros(6)], axis=1) * (width_m - radii)[:, None]
-    pose = free_pose(centers + rng.uniform(-0.1, 0.1, (6, 1)) * AHEAD, radii)
-    for direction in (AHEAD, -AHEAD):
-        assert np.isinf(ways_of(pose, scene.objects(), along(direction, INFLATED_M))).all()
 
 
 @pytest.mark.parametrize("kind", ["wall", "half-space", "ball", "tetrahedron", "mesh"])
@@ -147,30 +106,3 @@ def test_inside_a_u_the_way_is_the_one_to_its_bottom(side_gap_m: float, seamless
     # A narrow U exposes less of the bottom, so that weak strengths begin a little earlier.
     assert free_m - 0.012 < onsets[0] <= alone[0] + 1e-5
     assert free_m - 0.0015 < onsets[7] <= free_m
-
-
-def test_what_is_passed_over_is_not_felt() -> None:
-    scene = Scene().add().box([0.0, 0.0, 0.1], [0.1, 0.1, 0.01]).add().sphere([0.0, 0.0, 0.06], 0.02)
-    obstacle, passed_over = 0, 3
-    looked = along(AHEAD, INFLATED_M)
-    box, ball = (
-        look(ball_pose(), scene.objects(), looked, classes=classes).fast_m
-        for classes in ([obstacle, passed_over], [passed_over, obstacle])
-    )
-    np.testing.assert_allclose(box - ball, 0.05, atol=4e-4)
-    neither = look(ball_pose(), scene.objects(), looked, classes=[passed_over, passed_over])
-    assert np.isinf(neither.fast_m).all()
-    ignored = Scene().add(Role.IGNORED).box([0.0, 0.0, 0.1], [0.1, 0.1, 0.01]).objects()
-    assert np.isinf(ways_of(ball_pose(), ignored, looked)).all()
-
-
-def test_a_closed_gripper_before_a_wall_has_the_ways_of_an_open_one() -> None:
-    fingers = [[0.04, 0.0, 0.0], [-0.04, 0.0, 0.0]]
-    wall = Scene().add().box([0.0, 0.0, 0.1], [0.2, 0.2, 0.02]).objects()
-    opened, closed = (
-        look(
-            free_pose(np.array(fingers) * [[share], [share]], [0.008] * 2, [True] * 2), wall, looked, widest_m=half_gap
-        )
-        for share, half_gap, looked in ((1.0, 0.032, along(AHEAD, 0.01)), (0.2, 0.0, along(AHEAD, 0.01)))
-    )
-    np.testing.assert_allclose(closed.fast_m, opened.fast_m, atol=1e-12)

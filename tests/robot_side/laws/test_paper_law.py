@@ -13,7 +13,7 @@ from common.roles import Role
 from robot_side.enlargement.kinematic_error import position_covariance
 from robot_side.laws.paper import PERIOD_S, REFERENCE_SHARE
 from robot_side.overlap import sphere_box, sphere_sphere
-from tests.helpers.field.fields import AHEAD, RADIUS_M, ball_pose
+from tests.helpers.field.fields import RADIUS_M, ball_pose
 from tests.helpers.field.situations import (
     ACCELERATION_M_S2,
     CAMERA_SD_M,
@@ -49,17 +49,6 @@ def test_the_enlargement_is_as_printed() -> None:
     spread = NormalDist().inv_cdf(0.95) * np.sqrt(variance + CAMERA_SD_M**2)
     expected = 0.2 * speeds + 0.003 + math.sqrt(3.0) * 0.002 + spread
     assert sensed.enlargement_m == pytest.approx(expected.max(), rel=1e-9)
-
-
-def test_it_grows_with_speed_and_with_delay_in_any_direction() -> None:
-    def enlargement_m(speed_m_s: float, loop_age_s: float, side: float = 1.0) -> float:
-        rates = moving(side * speed_m_s * AHEAD)
-        return senses().sense(ball_pose(), joint_velocities_rad_s=rates, loop_age_s=loop_age_s).enlargement_m
-
-    grown = [enlargement_m(*pair) for pair in ((0.0, 0.5), (0.1, 0.1), (0.1, 0.5), (0.25, 0.5), (0.25, 1.0))]
-    assert grown[0] == pytest.approx(SIGMA_M)
-    assert grown == sorted(set(grown))
-    assert enlargement_m(0.2, 0.3, -1.0) == enlargement_m(0.2, 0.3)
 
 
 def test_the_overlap_is_the_total_of_all_spheres_and_objects() -> None:

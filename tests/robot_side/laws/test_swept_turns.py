@@ -13,7 +13,6 @@ from robot_side.laws.sensed import L2, R2, STICK
 from tests.helpers.field.fields import EQUAL_M, ball_pose
 from tests.helpers.field.situations import Senses, at, situation, swept, walls
 from tests.helpers.gripper_poses import free_pose
-from tests.helpers.perceived_scenes import Scene
 
 # Times of looks
 
@@ -100,17 +99,6 @@ def test_what_an_object_is_is_worked_out_when_roles_or_the_held_object_change() 
 # Validity between two looks
 
 
-def test_ways_are_shortened_by_what_the_tool_has_moved_along() -> None:
-    senses = Senses(step_s=0.001)
-    before = senses.sense(at(0.0), walls(0.08, 0.05))
-    looked = senses.law.summary()["fields"]
-    after = senses.sense(at(0.002, 0.004), walls(0.08, 0.05))
-    assert senses.law.summary()["fields"] == looked
-    np.testing.assert_allclose(after.r2.fast_m, np.array(before.r2.fast_m) - 0.002, atol=1e-12)
-    np.testing.assert_allclose(after.r2.slow_m, np.array(before.r2.slow_m) - 0.002, atol=1e-12)
-    np.testing.assert_allclose(after.l2.fast_m, np.array(before.l2.fast_m) + 0.002, atol=1e-12)
-
-
 def test_a_way_that_was_found_holds_for_a_tenth_of_a_second_and_a_new_one_at_once() -> None:
     """Strength rises at once and falls slowly, so that noise causes no flicker where an object is just passed."""
     senses = Senses(step_s=0.01)
@@ -125,16 +113,6 @@ def test_a_way_that_was_found_holds_for_a_tenth_of_a_second_and_a_new_one_at_onc
     for _ in range(2):
         again = senses.sense(at(0.0), near).r2.fast_m
     np.testing.assert_allclose(again, there, atol=1e-12)
-
-
-def test_what_was_seen_along_another_direction_holds_no_more() -> None:
-    senses = Senses(step_s=0.01)
-    ball = Scene().add().sphere([0.0, 0.0, 0.1], 0.02).objects()
-    assert senses.sense(at(0.0), ball).r2.fast_m[0] < 0.07
-    turned = ball_pose(tool_rotation=np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]]))
-    for _ in range(2):
-        found = senses.sense(turned, ball)
-    assert found.r2.fast_m[0] == found.horizon_m
 
 
 # Mismatches

@@ -1,7 +1,6 @@
 """Distances to primitives, compared with scipy's convex hulls and non-negative least squares; distances to objects."""
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -21,8 +20,6 @@ from tests.helpers.field.nearest_point import (
     Nearest,
     distance_to_object,
     nearest_on_box,
-    nearest_on_half_space,
-    nearest_on_sphere,
     nearest_on_tetrahedron,
 )
 from tests.helpers.meshes import CUBE_CORNERS, CUBE_TRIANGLES
@@ -84,40 +81,6 @@ def test_tetrahedra_against_their_hulls(seed: int, spread: float, flip: bool) ->
         vertices = vertices[:, [1, 0, 2, 3]]
     points = vertices.mean(axis=1) + rng.normal(size=(6, 3)) * spread
     _check_against_hull(points, list(vertices), nearest_on_tetrahedron(points, vertices))
-
-
-def _primitives(seed: int, count: int) -> dict[str, Callable[[FloatArray], Nearest]]:
-    rng = np.random.default_rng(seed)
-    centers, rotations, half_sizes = _boxes(rng, count)
-    radii = rng.uniform(0.1, 1.0, count)
-    vertices = rng.normal(size=(count, 4, 3))
-    normals = rng.normal(size=(count, 3))
-    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    offsets = rng.normal(size=count)
-    return {
-        "sphere": lambda points: nearest_on_sphere(points, centers, radii),
-        "box": lambda points: nearest_on_box(points, centers, rotations, half_sizes),
-        "tetrahedron": lambda points: nearest_on_tetrahedron(points, vertices),
-        "half-space": lambda points: nearest_on_half_space(points, normals, offsets),
-    }
-
-
-@pytest.mark.parametrize("kind", ["sphere", "box", "tetrahedron", "half-space"])
-def test_direction_is_the_negative_gradient_of_the_signed_distance(kind: str) -> None:
-    count, step = 400, 1e-6
-    nearest = _primitives(3, count)[kind]
-    points = np.random.default_rng(4).normal(size=(count, 3))
-    distance, direction = nearest(points)
-    slopes = np.stack(
-        [(nearest(points + e)[0] - nearest(points - e)[0]) / (2.0 * step) for e in np.eye(3) * step],
-        axis=1,
-    )
-    # A few of the points are within a step of a medial axis, where there is no gradient.
-    agree = np.abs(slopes + direction).max(axis=1) < 1e-4
-    assert agree.mean() > 0.99
-    for inside in (distance < 0.0, distance > 0.0):
-        assert inside.sum() >= 4
-        assert agree[inside].mean() > 0.9
 
 
 def test_points_on_the_surface_look_into_the_solid() -> None:

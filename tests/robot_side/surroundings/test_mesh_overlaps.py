@@ -10,19 +10,11 @@ from robot_side.overlap.meshes.mesh_pairs import mesh_pairs
 from robot_side.overlap.meshes.mesh_shapes import capsule_mesh
 from robot_side.surroundings.placed_meshes import overlap_one_mesh
 from robot_side.surroundings.scene_table import scene_table
-from tests.helpers.meshes import CUBE_CORNERS, CUBE_TRIANGLES, cup, grid_tetrahedra, round_mesh, surface_of
+from tests.helpers.meshes import CUBE_CORNERS, CUBE_TRIANGLES, cup, hollow_cube, round_mesh
 from tests.helpers.perceived_scenes import Scene, random_rotation
 
 INT64, EQUAL = 300, 1e-12
 Surface = tuple[FloatArray, IntArray]
-
-
-def hollow() -> Surface:
-    """Return vertices and triangles of a cube with a cubic cavity in its middle."""
-    places, tetrahedra = grid_tetrahedra(3)
-    middle = (np.floor(places[tetrahedra].mean(axis=1)) == 1.0).all(axis=1)
-    used, numbers = np.unique(surface_of(tetrahedra[~middle]), return_inverse=True)
-    return 0.03 * (places[used] - 1.5), numbers.reshape(-1, 3)
 
 
 SURFACES: dict[str, tuple[Surface, bool]] = {
@@ -31,7 +23,7 @@ SURFACES: dict[str, tuple[Surface, bool]] = {
     "ball": ((0.05 * round_mesh(6)[0], round_mesh(6)[1]), True),
     "capsule": (capsule_mesh(0.02, 0.05, 4)[:2], True),
     "cup": (cup(), False),
-    "hollow": (hollow(), False),
+    "hollow": (hollow_cube(), False),
     "torus": ((0.03 * torus(12, 6)[0], torus(12, 6)[1]), False),
 }
 

@@ -26,7 +26,6 @@ def whole(rng: np.random.Generator) -> PerceivedObjects:
 
 
 def elsewhere(objects: PerceivedObjects, things: np.ndarray, rng: np.random.Generator) -> PerceivedObjects:
-    """Return a frame in which all numbers of the objects `things` are different."""
     changed = {}
     for kind in KINDS:
         mine = np.isin(getattr(objects, kind.owner), things)

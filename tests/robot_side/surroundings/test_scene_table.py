@@ -64,7 +64,6 @@ def test_a_table_is_made_once_for_each_frame(monkeypatch: pytest.MonkeyPatch) ->
 
 
 def moved(objects: PerceivedObjects, rng: np.random.Generator) -> PerceivedObjects:
-    """Return the objects with all primitives moved and turned; their sizes stay the same."""
     shift, turn = rng.normal(size=3), random_rotation(rng)
     return dataclasses.replace(
         objects,

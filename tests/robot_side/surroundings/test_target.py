@@ -54,23 +54,6 @@ def test_the_target_is_found_by_its_role() -> None:
     assert seeing.target(Scene().objects()) is None
 
 
-def test_without_a_target_the_nearest_ahead_becomes_it() -> None:
-    objects = balls(
-        ([0.0, 0.0, 0.4], Role.OBSTACLE), ([0.0, 0.0, 0.2], Role.OBSTACLE), ([0.0, 0.0, -0.1], Role.OBSTACLE)
-    )
-    assert following(objects) == "object1"
-    assert following(objects, approach=-AHEAD) == "object2"
-    assert following(objects, tool_position_m=np.array([0.0, 0.0, 0.3])) == "object0"
-
-
-def test_a_metre_off_the_axis_counts_as_three_along_it() -> None:
-    def first(off_axis_m: float) -> str | None:
-        return following(balls(([0.0, 0.0, 0.4], Role.OBSTACLE), ([0.0, off_axis_m, 0.1], Role.OBSTACLE)))
-
-    assert first(0.099) == "object1"
-    assert first(0.101) == "object0"
-
-
 @settings(derandomize=True, deadline=None, max_examples=40)
 @given(seed=st.integers(0, 2**32 - 1), count=st.integers(2, 7))
 def test_pressing_again_and_again_visits_each_in_order_of_nearness_and_begins_anew(seed: int, count: int) -> None:

@@ -33,12 +33,6 @@ def test_what_has_stopped_is_at_rest_after_the_window() -> None:
             assert (np.abs(found) < 1e-9).all()
 
 
-def test_noise_of_a_frame_counts_little() -> None:
-    rng, seen = np.random.default_rng(3), ObjectVelocities()
-    found = [seen.see(frame * FRAME_S, 1e-3 * rng.standard_normal((1, 3))) for frame in range(400)]
-    assert np.std(found[10:]) < 0.008
-
-
 def test_another_number_of_objects_is_refused() -> None:
     seen = ObjectVelocities()
     seen.see(0.0, np.zeros((2, 3)))
