@@ -25,7 +25,6 @@ class Arm:
 
     @property
     def pressed_n(self) -> float:
-        """Force with which the held object is pressed on the table, in newtons."""
         return STIFFNESS_N_M * max(0.0, -self.meant_m)
 
     def go(self, speed_m_s: float, duration_s: float, jolt_n: float = 0.0) -> float | None:

@@ -1,5 +1,3 @@
-"""Scenes for the tests of the simulation."""
-
 from pathlib import Path
 
 import pytest
@@ -15,5 +13,4 @@ def built_in() -> Scene:
 
 @pytest.fixture
 def shapes(tmp_path: Path) -> Scene:
-    """Scene of the planar arm before objects of every shape."""
     return load_scene(planar_arm(tmp_path, world=SHAPES, extra_top=STONE), "tcp")

@@ -19,6 +19,7 @@ from robot_side.drivers.mujoco.joint_reference import MotionLimits
 from robot_side.drivers.mujoco.robot_model import SiteAxis
 from robot_side.drivers.mujoco.scene import Scene, load_scene
 from tests.helpers.arm_models import TENDON_GRIPPER, planar_arm
+from tests.robot_side.drivers.mujoco.test_arm import SlowMachine
 
 ASSETS = Path(load_scene.__code__.co_filename).parent / "assets"
 SECOND_ARM = """<body name="second" pos="0 1 0"><joint name="other"/><geom size="0.05"/></body></worldbody>"""
@@ -227,17 +228,7 @@ def test_fingers_that_do_not_close_on_the_target_are_said(tmp_path: Path) -> Non
 
 @pytest.mark.parametrize(("reading_s", "said"), [(0.004, 1), (0.0, 0)])
 def test_physics_that_is_slower_than_real_time_is_said(reading_s: float, said: int) -> None:
-    class Readings:
-        """Clock that goes on by `reading_s` with each reading."""
-
-        def __init__(self) -> None:
-            self.now_s = 0.0
-
-        def now(self) -> float:
-            self.now_s += reading_s
-            return self.now_s
-
-    lines = cost_findings(load_scene(), Readings())
+    lines = cost_findings(load_scene(), SlowMachine(reading_s))
     assert len(lines) == said
     assert not said or "4.0 ms for each step of 1 ms" in lines[0]
 

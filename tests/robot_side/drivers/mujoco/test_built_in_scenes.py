@@ -20,7 +20,6 @@ HOME = f'{COUPLING}<keyframe><key name="home" qpos="0.4 -1 0 0"/></keyframe>'
 
 
 def box(scene: Scene, name: str) -> tuple[Any, Any]:
-    """Return centre (3,) and half sizes (3,) of an object that consists of one box."""
     geom = next(thing for thing in scene.objects if thing.name == name).geoms[0]
     return scene.data.geom_xpos[geom], scene.model.geom_size[geom]
 

@@ -102,48 +102,6 @@ def test_readings_of_other_joints_are_refused(joints: int, fingers: int) -> None
         MujocoKinematics(load_scene()).pose(state)
 
 
-def test_encoder_noise_moves_the_tool_as_the_propagated_error_says() -> None:
-    driver = ToolDriver.load()
-    encoder = Encoder(2e-3, 1e-3, seed=2)
-    data, robot = driver.scene.data, driver.scene.robot
-    true = data.qpos[robot.arm_positions].copy()
-    state = driver.arm.state(driver.now_s)
-    errors = []
-    for _ in range(3000):
-        reading = type(state)(**{**state.__dict__, "joint_positions_rad": encoder.read(true)})
-        pose = driver.pose(reading)
-        errors.append(pose.tool_position_m - data.site_xpos[robot.site])
-    jacobian = pose.tool_jacobian[:3]
-    predicted = encoder.standard_deviation_rad() ** 2 * jacobian @ jacobian.T
-    # Whitened by what eq. 5 predicts, the errors have unit covariance; 3000 samples leave about 2.6 % (1 sigma).
-    whitened = np.linalg.solve(np.linalg.cholesky(predicted), np.array(errors).T)
-    np.testing.assert_allclose(np.cov(whitened), np.eye(3), atol=0.1)
-    assert np.abs(whitened.mean(axis=1)).max() < 4.0 / np.sqrt(3000)
-
-
-SIGNS = np.array(np.meshgrid([-1.0, 1.0], [-1.0, 1.0], [-1.0, 1.0])).reshape(3, -1).T
-
-
-@pytest.mark.parametrize("closing_s", [0.0, 0.3, 0.8])
-def test_the_spheres_go_with_the_boxes_of_the_gripper_wherever_its_fingers_are(closing_s: float) -> None:
-    """In its link's frame, each box of the gripper is covered and no sphere protrudes too far (see test_spheres)."""
-    driver = ToolDriver.load(encoder=Encoder(0.0, 0.0))
-    driver.move(np.array([0.05, 0.1, -0.05, 0.2, 0.1, 0.3]), 0.2)
-    state = driver.grip(1.0, closing_s) if closing_s else driver.wait(PERIOD_S)
-    scene, pose = driver.scene, driver.pose(state)
-    mujoco.mj_forward(scene.model, scene.data)
-    assert len(pose.sphere_radii_m) == 246
-    depths = np.full(246, -np.inf)
-    for geom, on_finger in zip(scene.robot.gripper_geoms, scene.robot.geom_on_finger, strict=True):
-        half_m, turned = scene.model.geom_aabb[geom, 3:], scene.data.geom_xmat[geom].reshape(3, 3)
-        local = (pose.sphere_centers_m - scene.data.geom_xpos[geom]) @ turned
-        own = pose.sphere_on_finger == on_finger
-        apart = np.linalg.norm((SIGNS * half_m)[:, None] - local[own], axis=2)
-        assert (apart <= pose.sphere_radii_m[own] + 1e-8).any(axis=1).all()
-        depths = np.maximum(depths, (half_m - np.abs(local)).min(axis=1))
-    assert (pose.sphere_radii_m - depths).max() <= 0.003 + 1e-8
-
-
 def test_nothing_at_the_tool_is_told(tmp_path: Path) -> None:
     bare = """<mujoco><worldbody><body><joint name="j"/><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>
       <site name="end"/></body><body name="box"><geom size="0.1"/></body></worldbody>

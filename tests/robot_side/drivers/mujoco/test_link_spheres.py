@@ -17,7 +17,6 @@ BOXES = '<geom name="box" type="box" pos="0.1 0 0.05" euler="20 30 0" size="0.02
 
 
 def inside(kind: int, size_m: FloatArray, points_m: FloatArray) -> BoolArray:
-    """Return which of the points (n, 3) of a geom's box are in the geom."""
     if kind != GeomKind.CAPSULE:
         return np.ones(len(points_m), dtype=bool)
     points_m[:, 2] -= np.clip(points_m[:, 2], -size_m[1], size_m[1])

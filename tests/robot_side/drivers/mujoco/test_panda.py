@@ -9,7 +9,6 @@ import pytest
 from common.roles import Role
 from robot_side.drivers.mujoco.camera import MujocoCamera
 from robot_side.drivers.mujoco.ground_truth import GroundTruth
-from robot_side.drivers.mujoco.hand.gripper_measurement import measure_gripper
 from tests.helpers.tool_driver import PERIOD_S, VALID_S, ToolDriver
 
 
@@ -68,20 +67,6 @@ def test_the_tool_moves_as_asked_and_stops_when_nobody_asks(
     assert np.abs(state.joint_velocities_rad_s).max() < 1e-3
     assert travelled < np.linalg.norm(wanted) * VALID_S + 0.01
     alone.go_to(path[0], 1.5)
-
-
-def test_the_gripper_closes_and_opens(alone: ToolDriver) -> None:
-    travel = measure_gripper(alone.scene)
-    assert travel is not None
-    # A low input opens this one; the stroke is 85 mm (Robotiq's data sheet of the 2F-85).
-    np.testing.assert_array_equal(travel.open_control, [0.0])
-    assert travel.openings_m[0] == pytest.approx(0.085, abs=1e-3)
-    assert travel.openings_m[-1] == pytest.approx(0.0, abs=1e-6)
-    closed = alone.grip(1.0, 2.0)
-    assert closed.gripper_opening_m < 1e-3
-    assert not closed.gripper_holding
-    opened = alone.grip(-1.0, 2.0)
-    assert opened.gripper_opening_m == pytest.approx(0.085, abs=2e-3)
 
 
 def test_it_picks_up_the_block_of_its_own_scene() -> None:

@@ -31,30 +31,6 @@ def test_the_numbers_of_the_kinds_are_mujocos() -> None:
             assert int(getattr(theirs, prefix + kind.name.replace("_", ""))) == kind
 
 
-def test_the_built_in_scene_is_a_cluttered_table(built_in: Scene) -> None:
-    roles = built_in.roles
-    assert [name for name, role in roles.items() if role is Role.TARGET] == ["target"]
-    assert {name for name, role in roles.items() if role is Role.SUPPORT} == {"floor", "table"}
-    assert sum(role is Role.OBSTACLE for role in roles.values()) >= 6
-    assert built_in.primitives.volume_errors == {}
-    assert built_in.warnings == ()
-    seen = MujocoCamera(built_in).perceive(0.0)
-    counts = [len(seen.sphere_radii_m), len(seen.box_object), len(seen.tetrahedron_object), len(seen.half_space_object)]
-    assert counts == [2, 6, 1, 1]
-
-
-def test_the_arm_starts_with_its_tool_forward_over_the_table(built_in: Scene) -> None:
-    robot, data = built_in.robot, built_in.data
-    np.testing.assert_allclose(data.site_xpos[robot.site], [0.55, 0.0, 0.2], atol=1e-4)
-    rotation = data.site_xmat[robot.site].reshape(3, 3)
-    # As a camera sees: x right, y down, z forward.
-    np.testing.assert_allclose(rotation, [[0, 0, 1], [-1, 0, 0], [0, -1, 0]], atol=1e-4)
-    assert GroundTruth(built_in).observe().contacts == frozenset()
-    joints = [built_in.model.joint(int(joint)).name for joint in robot.arm_joints]
-    assert joints == ["shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3"]
-    np.testing.assert_array_equal(robot.geom_on_finger, [False, True, True, True, True])
-
-
 def test_the_built_in_arm_has_the_published_dimensions(built_in: Scene) -> None:
     data = mujoco.MjData(built_in.model)
     random = np.random.default_rng(1)
@@ -222,7 +198,6 @@ KEY = '<keyframe><key name="home" qpos="{} 0 0 0" qvel="0 0 0 {}"/></keyframe>'
 HEAP = "".join(f'<body pos="1 {0.01 * ball} 2"><freejoint/><geom size="0.05"/></body>' for ball in range(40))
 REFUSED: list[tuple[dict[str, str] | str, str | None, str]] = [
     ("<mujoco", "tcp", "valid: an MJCF file that MuJoCo compiles"),
-    ("<robots/>", "tcp", "valid: an MJCF file that MuJoCo compiles"),
     ({}, "tool", "valid: tcp, camera_mount"),
     ({}, None, "none is given; valid: tcp, camera_mount"),
     ({"arm_actuators": "", "gripper_actuators": ""}, "tcp", "no actuators"),
@@ -262,9 +237,7 @@ REFUSED: list[tuple[dict[str, str] | str, str | None, str]] = [
     ({"extra_bottom": KEY.format("nan", "0")}, "tcp", "keyframe 'home' holds NaN or infinity; valid: finite qpos"),
     ({"extra_bottom": KEY.format("0", "inf")}, "tcp", "keyframe 'home' holds NaN or infinity; valid: finite qvel"),
     ({"world": '<geom name="post" size="0.1" pos="nan 0 0"/>'}, "tcp", "post"),
-    ({"world": '<geom name="post" size="0.1" pos="1e99 0 0"/>'}, "tcp", "post"),
     ({"extra_top": '<option gravity="nan 0 0"/>'}, "tcp", "at its start its joints accelerate without bound"),
-    ({"extra_top": '<option gravity="0 0 -1e30"/>'}, "tcp", "at its start its joints accelerate without bound"),
     ({"arm_actuators": MUSCLE.replace('name="pull" ', "")}, "tcp", "the actuator 1 of joint 'elbow' is of"),
 ]
 

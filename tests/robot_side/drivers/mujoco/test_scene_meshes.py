@@ -9,13 +9,11 @@ import numpy as np
 import pytest
 
 from common.arrays import FloatArray, IntArray
-from robot_side.compiled.kernel import Compiled
-from robot_side.core import RobotSide
 from robot_side.drivers.mujoco.camera import MujocoCamera
 from robot_side.drivers.mujoco.scene import Scene, load_scene
 from robot_side.field.object_class import OBSTACLE, SKIPPED
 from robot_side.field.total_overlap import total_overlap_m3
-from robot_side.overlap import sphere_sphere, warm_up
+from robot_side.overlap import sphere_sphere
 from robot_side.parts import build_parts
 from robot_side.settings import RobotSettings
 from robot_side.surroundings.perceived import PerceivedObjects
@@ -40,19 +38,16 @@ VOLUMES_M3 = {
 
 
 def mesh_asset(name: str, vertices: FloatArray, triangles: IntArray, inertia: str = "convex") -> str:
-    """Return the MJCF text of a mesh asset with these vertices and triangles."""
     numbers = " ".join(f"{value:.17g}" for value in vertices.ravel())
     indices = " ".join(str(index) for index in triangles.ravel())
     return f'<asset><mesh name="{name}" inertia="{inertia}" vertex="{numbers}" face="{indices}"/></asset>'
 
 
 def scene_with(path: Path, world: str, assets: str = "") -> Scene:
-    """Load a scene of the planar arm and the objects in the MJCF text `world`."""
     return load_scene(planar_arm(path, world=world, extra_top=assets), "tcp")
 
 
 def placed(scene: Scene, in_body_m: FloatArray, body: str = "round") -> FloatArray:
-    """Return points (n, 3) in the world frame that are given in a body's frame."""
     frame = scene.data.body(body)
     in_world: FloatArray = frame.xpos + in_body_m @ frame.xmat.reshape(3, 3).T
     return in_world
@@ -226,19 +221,6 @@ def test_a_height_field_is_the_solid_that_rays_hit(shape: tuple[int, int], tmp_p
 
 
 # Notes and skipped work
-
-
-def test_nothing_is_compiled_within_a_tick_at_meshes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def late(kernel: Compiled) -> None:
-        raise AssertionError(f"{kernel.name} was not ready")
-
-    model = planar_arm(tmp_path, world='<geom name="post" type="cylinder" size="0.05 0.1" pos="0.33 0 0.8"/>')
-    robot = RobotSide(build_parts(RobotSettings(model=model, site="tcp"), 1, "clock"))
-    warm_up()
-    monkeypatch.setattr(Compiled, "prepare", late)
-    for tick in range(5):
-        robot.tick(0.001 * tick)
-    assert robot.figures.summary()["overlap_mm3"]["max"] > 0.0
 
 
 def notes_on_shapes(model: Path) -> list[str]:

@@ -18,7 +18,6 @@ SLEEP = int(mujoco.mjtEnableBit.mjENBL_SLEEP)
 
 
 def asleep(scene: Scene) -> set[str]:
-    """Return the bodies with a free joint that MuJoCo lets sleep."""
     model, data = scene.model, scene.data
     bodies = {name: model.body(f"table_scene/{name}").id for name in FREE}
     return {name for name, body in bodies.items() if not data.tree_awake[model.body_treeid[body]]}

@@ -159,19 +159,6 @@ def test_the_approach_is_the_tools_axis_and_the_speed_along_it() -> None:
         assert script.truth.approach()[1] == pytest.approx(along_m_s, abs=1e-3)
 
 
-def test_it_changes_nothing_in_the_physics() -> None:
-    watched, alone = Script.load("moving"), Script.load("moving").scene
-    for _ in range(200):
-        for scene in (watched.scene, alone):
-            mujoco.mj_step(scene.model, scene.data)
-        watched.truth.update(None)
-        watched.truth.gap_m(None)
-        watched.truth.way_left_m(AHEAD, None)
-        watched.truth.approach()
-    np.testing.assert_array_equal(watched.scene.data.qpos, alone.data.qpos)
-    np.testing.assert_array_equal(watched.scene.data.qvel, alone.data.qvel)
-
-
 def test_a_support_counts_only_where_it_is_asked_for() -> None:
     scene = load_scene(DATA / "wall.xml", "tool", {"wall": Role.SUPPORT})
     found = []

@@ -1,5 +1,3 @@
-"""Fixture for the tests of remote drivers: the built-in scene."""
-
 import pytest
 
 from robot_side.drivers.mujoco.scene import Scene, load_scene
