@@ -47,21 +47,17 @@ class ArmWatch(Listener):
         """Number of commands to move, with a joint velocity other than 0"""
 
     def on_tick(self, tick: Tick) -> None:
-        """Note the state and the command of a tick."""
         if tick.measured is not None:
             self.note(tick.measured)
         if tick.found is not None and tick.found.commanded_rad_s is not None:
             self.told_to_move += bool(np.any(tick.found.commanded_rad_s))
 
     def note(self, state: ArmState) -> None:
-        """Note the speed in a measured state, unless it was noted before."""
         if not self.speeds_rad_s or state.time_s > self.speeds_rad_s[-1][0]:
             self.speeds_rad_s.append((state.time_s, float(np.abs(state.joint_velocities_rad_s).max())))
 
 
 class Operator:
-    """An operator's end of the link, and the messages that it has received."""
-
     def __init__(self, epoch: int, peer: bytes) -> None:
         self.link = LinkEnd("operator", epoch, "clock")
         self.peer = peer
@@ -75,16 +71,13 @@ class Operator:
 
     @property
     def state(self) -> SessionState:
-        """State of the session by the newest notice."""
         return SessionState.UNKNOWN if self.notice is None else self.notice.session
 
     @property
     def felt(self) -> list[StiffnessUpdate]:
-        """All stiffness messages received."""
         return [message for message in self.inbox if isinstance(message, StiffnessUpdate)]
 
     def take(self, message: StiffnessUpdate | Hello | LeaseNotice, now_s: float) -> None:
-        """Receive one message."""
         self.inbox.append(message)
         arrival = self.link.arrived(message, now_s)
         if isinstance(message, LeaseNotice) and arrival.fresh:
@@ -102,7 +95,6 @@ class Bench:
     def __init__(
         self, settings: RobotSettings = QUICK, parts: RobotParts | None = None, listeners: Sequence[Listener] = ()
     ) -> None:
-        """Make a robot side from `parts`; without them, from the settings."""
         self.watch = ArmWatch()
         parts = parts or build_parts(settings, 1, "clock")
         self.arm, self.robot = parts.arm, RobotSide(parts, [self.watch, *listeners])
@@ -112,17 +104,14 @@ class Bench:
 
     @property
     def now_s(self) -> float:
-        """Virtual time, in seconds."""
         return self.ticks * TICK_S
 
     @property
     def state(self) -> str:
-        """State of the robot side's safety: disarmed, armed or stopped."""
         return self.robot.session.safety.state
 
     @property
     def speed_rad_s(self) -> float:
-        """Present speed of the fastest joint."""
         return self.watch.speeds_rad_s[-1][1]
 
     @property
@@ -132,23 +121,19 @@ class Bench:
         return np.array(self.views[-1].tool_position_m)
 
     def operator(self, epoch: int, peer: bytes = b"operator") -> Operator:
-        """Return a new operator that sends nothing yet, and receives what is sent to `peer`."""
         operator = self.operators[peer] = Operator(epoch, peer)
         return operator
 
     def join(self, epoch: int, peer: bytes = b"operator") -> Operator:
-        """Return a new operator that has sent a Hello and received its state."""
         operator = self.operator(epoch, peer)
         self.say_hello(operator)
         self.tick()
         return operator
 
     def say_hello(self, operator: Operator) -> None:
-        """Let a Hello of the operator arrive at the robot side."""
         self.robot.receive(operator.peer, encode(operator.link.hello(self.now_s)), self.now_s)
 
     def send(self, operator: Operator, **fields: Any) -> bytes:
-        """Let a command of the operator arrive at the robot side; return the command's bytes."""
         payload = operator.command(self.now_s, **fields)
         self.robot.receive(operator.peer, payload, self.now_s)
         return payload
@@ -167,7 +152,6 @@ class Bench:
                     operator.take(message, self.now_s)
 
     def silence(self, duration_s: float) -> None:
-        """Tick for `duration_s` without messages from operators."""
         self.tick(round(duration_s / TICK_S))
 
     def drive(self, duration_s: float, operator: Operator, **fields: Any) -> None:
@@ -189,6 +173,5 @@ class Bench:
             raise RuntimeError(f"the robot side is {self.state}; expected: armed")
 
     def cruise(self, operator: Operator, duration_s: float = 0.3) -> None:
-        """Arm the arm, and pull R2 so that the tool advances at an even speed."""
         self.arm_it(operator)
         self.drive(duration_s, operator, r2=CRUISE)

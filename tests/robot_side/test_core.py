@@ -76,8 +76,6 @@ def test_the_status_says_who_pulls_how_far_everything_is_and_why_it_stopped(benc
 
 
 class Listening(Listener):
-    """Listener that keeps the law's input of each tick."""
-
     def __init__(self) -> None:
         self.heard: list[Situation] = []
 
@@ -125,7 +123,6 @@ def test_what_the_law_finds_is_what_is_sent(bench: Bench, listening: Listening) 
 
 
 def told_m_s(operator: Operator) -> float:
-    """Return the speed that the newest command got, by the operator's newest stiffness message."""
     told = operator.felt[-1].told_m_s
     assert told is not None
     return told
@@ -206,3 +203,16 @@ def test_an_echo_from_the_future_ages_nothing(bench: Bench) -> None:
     bench.send(operator, header=header)
     bench.tick(10)
     assert bench.robot.session.loop_age_s(bench.now_s) is None
+
+
+def test_an_operator_hears_how_the_tool_is_turned_to_each_frame_of_the_sticks(bench: Bench) -> None:
+    bench.tick(25)
+    view, frames = bench.views[-1], bench.robot.parts.frames
+    assert frames is not None
+    assert bench.robot.newest is not None
+    tool = bench.robot.newest[1].pose.tool_rotation
+    assert view.base_turn_rad == pytest.approx(frames.base.turn_rad(tool), abs=1e-2)
+    assert view.camera_turn_rad == pytest.approx(
+        frames.camera.turn_rad(tool, mirrored=frames.camera.faces(tool)), abs=1e-2
+    )
+    assert abs(view.base_turn_rad - view.camera_turn_rad) > 0.1

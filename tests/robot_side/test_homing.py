@@ -26,7 +26,6 @@ def bench() -> Bench:
 
 
 def off_rad(bench: Bench) -> float:
-    """Return how far the joint farthest from home is."""
     home_rad = bench.robot.parts.home_rad
     assert home_rad is not None
     return float(np.abs(bench.arm.state(bench.now_s).joint_positions_rad - home_rad).max())
@@ -62,8 +61,6 @@ def test_a_lower_share_is_slower(bench: Bench) -> None:
 
 
 class Seen:
-    """Camera whose frame the test gives."""
-
     def __init__(self, objects: PerceivedObjects) -> None:
         self.objects = objects
 

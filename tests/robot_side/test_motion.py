@@ -16,8 +16,6 @@ PARTS = build_parts(RobotSettings(), 1, "clock")
 
 
 class ToldArm(Arm):
-    """Arm that keeps the commands it gets."""
-
     joint_count = PARTS.arm.joint_count
 
     def __init__(self) -> None:

@@ -17,8 +17,6 @@ SETTINGS = replace(QUICK, model=DATA / "place_held.xml", site="tool")
 
 
 class Forgetful(PassedOnArm):
-    """Arm that measures no joint loads."""
-
     def state(self, now_s: float) -> ArmState:
         return replace(self.arm.state(now_s), joint_loads_nm=None)
 

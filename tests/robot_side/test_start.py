@@ -1,11 +1,13 @@
 """Start of the robot side's process with a port that is in use."""
 
 import json
+import resource
 import socket
 from pathlib import Path
 
 import pytest
 
+from common.sockets.robot import RobotSockets
 from tests.helpers.python_process import ended
 
 pytestmark = pytest.mark.processes
@@ -49,3 +51,9 @@ def test_a_kernel_that_is_compiled_while_it_runs_is_named_once_and_counted(tmp_p
     figures = json.loads(summary.read_text())
     assert (figures["compiled_late"], figures["errors"]) == (1, [])
     assert figures["ticks"] > 1
+
+
+def test_a_port_takes_a_quarter_of_the_descriptors_that_the_process_may_open(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(resource, "getrlimit", lambda _: (256, 4096))
+    with RobotSockets("tcp://127.0.0.1:*", "tcp://127.0.0.1:*") as robot:
+        assert [gate.connections.limit for gate in robot._gates] == [64, 64]

@@ -41,7 +41,6 @@ def refuse(kernel: str) -> None:
 
 
 def explain(bench: Bench, parts: SceneParts) -> None:
-    """Ask for all that is shown to people."""
     assert bench.robot.newest is not None
     sensed, situation = bench.robot.newest
     parts.explains.explain("l2", situation, sensed)
@@ -84,7 +83,6 @@ def set_down(law: LawName) -> None:
 
 
 def approach_a_mesh(law: LawName) -> None:
-    """Advance in a scene with a mesh."""
     with prepared(law, DATA / "mug.xml") as parts:
         bench = Bench(parts=parts)
         bench.cruise(bench.join(2), 0.5)
@@ -116,7 +114,6 @@ class Driver:
 
 
 def meet_all_shapes(law: LawName) -> None:
-    """Advance while a driver's frames show each shape that they can."""
     with prepared(law, any_objects=True) as parts:
         driver = Driver()
         bench = Bench(parts=replace(parts, camera=driver))

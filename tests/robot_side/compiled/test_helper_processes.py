@@ -1,10 +1,7 @@
 """Compilation in helper processes: how kernels are shared out, which files are stored, and failures."""
 
 import os
-import select
 import signal
-import subprocess
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -17,7 +14,6 @@ from robot_side.compiled.helper_processes import KernelQueue, compile_in_helpers
 from robot_side.compiled.kernel import Compiled, imported_kernels
 from robot_side.compiled.sources import code_sizes
 from robot_side.compiled.warm_up import warm_up
-from tests.helpers.machines.waiting import LIMIT_S
 from tests.robot_side.compiled.fresh_kernels import NAMES, fresh_kernels
 
 
@@ -78,36 +74,6 @@ def test_a_process_that_is_killed_leaves_the_rest_to_us(tmp_path: Path, monkeypa
     warm_up(kernels=fresh)
     assert [kernel.cache_hits for kernel in fresh] == [0, 0, 0]
     assert all(kernel.is_kept for kernel in fresh)
-
-
-@pytest.mark.processes
-def test_nothing_goes_on_compiling_for_a_process_that_has_gone(tmp_path: Path) -> None:
-    program = (
-        "import os\n"
-        "import robot_side.overlap.volumes\n"
-        "from robot_side.compiled import helper_processes\n"
-        "from robot_side.compiled.kernel import imported_kernels\n"
-        "class Announcing(helper_processes.Companion):\n"
-        "    def __init__(self, *arguments):\n"
-        "        super().__init__(*arguments)\n"
-        "        print(self.process_id, flush=True)\n"
-        "helper_processes.Companion = Announcing\n"
-        "kernels = [kernel for kernel in imported_kernels() if 'precise' in kernel.name]\n"
-        "helper_processes.compile_in_helpers(kernels, 1)\n"
-    )
-    surroundings = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)}
-    with subprocess.Popen(
-        [sys.executable, "-c", program], stdout=subprocess.PIPE, text=True, env=surroundings
-    ) as process:
-        assert process.stdout is not None
-        ended = os.pidfd_open(int(process.stdout.readline()))
-        process.kill()
-    try:
-        # The descriptor becomes readable when the helper ends. That takes seconds, less than compiling the kernels.
-        assert select.select([ended], [], [], LIMIT_S)[0]
-    finally:
-        os.close(ended)
-    assert list(tmp_path.iterdir()) == []
 
 
 def test_without_a_place_to_keep_it_no_process_is_started(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -2,9 +2,7 @@
 
 import ast
 import importlib
-import os
 import pkgutil
-import subprocess
 import sys
 from pathlib import Path
 
@@ -12,6 +10,7 @@ import pytest
 
 import robot_side
 import robot_side.parts  # Imported before any test, because a library of the simulation starts a process when imported.
+from common.arrays import FloatArray
 from robot_side.compiled import sources as kernel_sources
 from robot_side.compiled.kernel import Compiled, imported_kernels
 from robot_side.compiled.sources import digest, sources
@@ -59,50 +58,15 @@ def test_a_change_in_any_source_changes_the_digest(monkeypatch: pytest.MonkeyPat
         assert digest(kernel.function) == before
 
 
-_BLOCK = """
-from robot_side.compiled.kernel import inlined
-from limits import LIMIT
+_MOST = 5.0
 
-@inlined
-def clipped(value):
-    return min({factor} * value, LIMIT)
-"""
-_KERNEL = """
-import numpy as np
-from robot_side.compiled.kernel import compiled, input_array, output_array
-from deeper.blocks import clipped
 
-@compiled(input_array(1), output_array(1))
-def clip(values, clipped_values):
+def _limited(values: FloatArray, limited: FloatArray) -> None:
     for i in range(values.size):
-        clipped_values[i] = clipped(values[i])
-
-result = np.empty(2)
-clip(np.array([1.0, 10.0]), result)
-print(*result, clip.cache_hits)
-"""
+        limited[i] = min(values[i], _MOST)
 
 
-@pytest.mark.processes
-def test_no_stale_machine_code_runs_when_a_file_elsewhere_changes(tmp_path: Path) -> None:
-    # Numba's own key would depend on the kernel's file alone.
-    (tmp_path / "deeper").mkdir()
-    (tmp_path / "clip.py").write_text(_KERNEL)
-
-    def run(factor: float, limit: float) -> str:
-        (tmp_path / "limits.py").write_text(f"LIMIT = {limit}")
-        (tmp_path / "deeper" / "blocks.py").write_text(_BLOCK.format(factor=factor))
-        environment = os.environ | {
-            "NUMBA_CACHE_DIR": str(tmp_path / "cache"),
-            "PYTHONPATH": f"{tmp_path}:{ROBOT_SIDE.parent}",
-            "PYTHONDONTWRITEBYTECODE": "1",
-        }
-        return subprocess.run(
-            [sys.executable, "-m", "clip"], env=environment, capture_output=True, text=True, check=True, cwd=tmp_path
-        ).stdout.strip()
-
-    assert run(2.0, 5.0) == "2.0 5.0 0"
-    assert run(2.0, 5.0) == "2.0 5.0 1"
-    assert run(3.0, 5.0) == "3.0 5.0 0"
-    assert run(3.0, 7.0) == "3.0 7.0 0"
-    assert run(3.0, 7.0) == "3.0 7.0 1"
+def test_a_change_in_a_constant_changes_the_digest(monkeypatch: pytest.MonkeyPatch) -> None:
+    before = digest(_limited)
+    monkeypatch.setattr(sys.modules[__name__], "_MOST", 7.0)
+    assert digest(_limited) != before

@@ -1,14 +1,11 @@
 """Mean and standard deviation of the predicted displacement's error, by a table over the loop age."""
 
-import math
 from pathlib import Path
 
 import pytest
 
 from common.errors import ConfigurationError
 from robot_side.enlargement.prediction_errors import (
-    BUILT_IN,
-    WITHOUT_TABLE,
     PredictionErrors,
     load_prediction_errors,
 )
@@ -98,15 +95,3 @@ def test_a_file_that_is_not_there_or_no_text_is_named(tmp_path: Path) -> None:
     (tmp_path / "picture.toml").write_bytes(b"\xff\xd8")
     with pytest.raises(ConfigurationError, match=r"picture\.toml"):
         load_prediction_errors(tmp_path / "picture.toml")
-
-
-def test_the_built_in_table_says_that_the_operators_own_reckoning_is_far_better() -> None:
-    errors = load_prediction_errors(BUILT_IN)
-    assert errors.arm is not None
-    assert len(errors.arm) == 12
-    for loop_age_s in (0.05, 0.1, 0.2, 0.4, 0.8):
-        operator, robot = (errors.at(kind, loop_age_s, 0.25) for kind in ("operator", "robot"))
-        assert all(math.isfinite(value) for value in (*operator, *robot))
-        assert abs(operator[0]) + operator[1] < 0.5 * (abs(robot[0]) + robot[1])
-        # The fifth that is assumed for an unknown arm exceeds this one's mean error.
-        assert abs(operator[0]) < WITHOUT_TABLE * 0.25 * loop_age_s

@@ -10,7 +10,7 @@ from common.protocol.session import SessionState
 from common.silence import KEEP_ALIVE_S
 from robot_side.operators.lease import MOST_OBSERVERS
 from robot_side.reporting.reports import OBSERVER_PERIOD_S
-from tests.robot_side.session_bench import CRUISE, Bench, Operator
+from tests.robot_side.session_bench import Bench, Operator
 
 
 @pytest.fixture
@@ -136,22 +136,3 @@ def test_a_peer_without_hello_hears_the_place_it_would_get(bench: Bench) -> None
     observer = bench.join(3, b"observer")
     assert place_of_a_stranger(bench) == 2
     assert (owner.state, observer.state) == (SessionState.DISARMED, SessionState.OBSERVING)
-
-
-def cruise_beside(asks: bool) -> tuple[list[tuple[float, float]], list[StiffnessUpdate]]:
-    bench = Bench()
-    owner, stranger = bench.join(2), Operator(99, b"stranger")
-    bench.arm_it(owner)
-    for _ in range(5):
-        bench.drive(0.1, owner, r2=CRUISE)
-        if asks:
-            bench.robot.receive(stranger.peer, stranger.command(bench.now_s), bench.now_s)
-    assert bench.robot.session.rejected == (5 if asks else 0)
-    return list(bench.watch.speeds_rad_s), owner.felt
-
-
-def test_the_driver_notices_nothing_of_a_stranger_who_asks() -> None:
-    (speeds, felt), (undisturbed, felt_alone) = cruise_beside(asks=True), cruise_beside(asks=False)
-    assert speeds == undisturbed
-    stripped = [[msgspec.structs.replace(one, header=felt[0].header) for one in each] for each in (felt, felt_alone)]
-    assert stripped[0] == stripped[1]

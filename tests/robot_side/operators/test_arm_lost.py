@@ -12,8 +12,6 @@ from tests.robot_side.session_bench import QUICK, Bench
 
 
 class SlowArm(PassedOnArm):
-    """Simulated arm whose states come late or not at all."""
-
     silent = False
     late_s = 0.0
     _newest: ArmState | None = None

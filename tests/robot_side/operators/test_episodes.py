@@ -16,8 +16,6 @@ from tests.robot_side.session_bench import QUICK, Bench, Operator
 
 
 class Heard(Listener):
-    """Listener that keeps the accepted marks."""
-
     def __init__(self) -> None:
         self.marks: list[EpisodeMark] = []
 
@@ -27,7 +25,6 @@ class Heard(Listener):
 
 
 def mark(bench: Bench, operator: Operator, number: int, kind: EpisodeMark) -> tuple[int, str]:
-    """Send a mark; return the answer."""
     bench.robot.receive(operator.peer, encode(Mark(operator.link.stamp(bench.now_s), number, kind)), bench.now_s)
     bench.tick()
     assert operator.notice is not None
@@ -53,7 +50,6 @@ def parts() -> SceneParts:
 
 
 def positions_m(bench: Bench) -> FloatArray:
-    """Return the objects' positions (k, 3) as perceived."""
     frame = bench.robot.sight.frame
     assert frame is not None
     assert frame.positions_m is not None
@@ -94,7 +90,6 @@ def test_a_reset_puts_arm_and_objects_back_while_disarmed(parts: SceneParts) -> 
 
 
 def _throw(parts: SceneParts) -> None:
-    """Give every object that can move a push."""
     robot = parts.scene.robot
     others = np.setdiff1d(np.arange(parts.scene.model.nv), [*robot.arm_velocities, *robot.finger_velocities])
     assert others.size

@@ -208,7 +208,6 @@ class OperatorMachine(RuleBasedStateMachine):
         self.compare()
 
     def compare(self) -> None:
-        """Assert that the session has the same state as the reference."""
         session, reference = self.session, self.reference
         owner = session.lease.owner
         assert (None if owner is None else owner.epoch) == (None if not reference.owner else reference.owner.epoch)

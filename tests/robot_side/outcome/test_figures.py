@@ -15,7 +15,6 @@ ROLES = {"post": Role.OBSTACLE, "cup": Role.TARGET, "table": Role.SUPPORT}
 def sensed(
     enlargement_m: float, overlap_m3: float = 0.0, l2: int = 0, r2: int = 0, tool_speed_m_s: float = 0.0
 ) -> Sensed:
-    """Return a result of the law. l2, r2: strength of each trigger, 0 to 8."""
     figures = {"enlargement_m": enlargement_m, "overlap_m3": overlap_m3, "tool_speed_m_s": tool_speed_m_s}
     return Sensed.of(l2=uniform_field(l2), r2=uniform_field(r2), horizon_m=0.2, **figures)
 

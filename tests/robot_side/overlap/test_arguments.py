@@ -190,22 +190,3 @@ def test_flat_solids_and_points_give_nothing() -> None:
     for function, arguments in CALLS.values():
         for result in function(**{**arguments, "radii": 0.0}, gradient=True):
             assert not result.any()
-
-
-def test_kernels_take_what_a_tick_has() -> None:
-    rng = np.random.default_rng(7)
-    vertices = rng.normal(size=(8, 4, 3))
-    frozen = vertices.copy()
-    frozen.flags.writeable = False
-    centers, radii = rng.normal(size=(8, 3)), np.ones(8)
-    expected = sphere_tetrahedron(centers, radii, vertices, gradient=True)
-    for overlaps in (
-        kernels.tetrahedron_pairs(centers, radii, vertices),
-        kernels.tetrahedron_pairs(centers, radii, frozen),
-    ):
-        for result, wanted in zip(overlaps, expected, strict=True):
-            np.testing.assert_array_equal(result, wanted)
-    with pytest.raises(TypeError):
-        kernels.tetrahedron_pairs(centers, radii, vertices.astype(np.float32))
-    with pytest.raises(TypeError):
-        kernels.tetrahedron_pairs(centers[::2], radii[::2], vertices[::2])

@@ -10,8 +10,6 @@ PICTURE = bytes(range(256)) * 60
 
 
 class Sockets:
-    """Stand-in for sockets that keeps sent messages."""
-
     def __init__(self) -> None:
         self.sent: list[tuple[bytes, bytes]] = []
         self.published: list[tuple[bytes, bytes]] = []

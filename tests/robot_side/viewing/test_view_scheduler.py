@@ -80,14 +80,6 @@ def test_shapes_come_again_every_three_seconds_and_when_another_begins_to_look()
     assert headers == sorted(set(headers))
 
 
-def test_a_recording_gets_the_scene_although_nobody_looks() -> None:
-    table = Table(always=("scene",))
-    table.run(2.0)
-    assert 55 <= len(table.states()) <= 61
-    assert len(table.shapes()) == 1
-    assert table.frames() == []
-
-
 def test_a_slow_video_link_delays_frames_and_never_a_stiffness() -> None:
     free, slow = Table(), Table(link=LinkSpec.parse("video: rate 2mbit"))
     for table in (free, slow):
