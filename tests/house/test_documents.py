@@ -190,21 +190,16 @@ _AN_OPTION = re.compile(r"\[--[^\]]*\]")
 
 @dataclass(frozen=True)
 class Document:
-    """Text of a Markdown file."""
-
     text: str
 
     @classmethod
     def read(cls, path: Path) -> "Document":
-        """Read the document in the file `path`."""
         return cls(path.read_text(encoding="utf-8"))
 
     def blocks(self) -> list[str]:
-        """Return every indented block, without its indentation."""
         return [block for found in _BLOCK.finditer(self.text) if (block := textwrap.dedent(found[1]).strip("\n"))]
 
     def spans(self) -> list[str]:
-        """Return every command between backticks, on one line."""
         return [" ".join(found[1].split()) for found in _SPAN.finditer(self.text)]
 
 

@@ -105,7 +105,6 @@ def opened(address: str) -> Connection:
 
 
 def read_until(page: Connection, kind: str) -> dict[str, object]:
-    """Return the page's next message of this kind."""
     while True:
         content = page.recv(timeout=LIMIT_S)
         message: dict[str, object] = json.loads(content) if isinstance(content, str) else {"kind": "picture"}

@@ -91,8 +91,6 @@ def patience(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 class Doctor:
-    """Run of the doctor whose output is stored."""
-
     def __init__(self, capsys: pytest.CaptureFixture[str]) -> None:
         self._capsys = capsys
 

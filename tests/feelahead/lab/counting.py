@@ -15,8 +15,6 @@ from feelahead.lab.table import Row, Table
 
 @dataclass(frozen=True)
 class Counting(Sweep):
-    """Count cells; the simplest question, for tests."""
-
     numbers: tuple[int, ...] = (1, 2, 3)
     folder: str = ""
     """Folder in which each cell writes a file. A file with a cell's name says what the cell must do: `kill`, `fail` or

@@ -46,7 +46,6 @@ def recording(name: str) -> LinkSample:
 
 
 def held(name: str, spec: str, seeds: int, pairs: int = 0) -> list[Goal]:
-    """Compare the model with the recording `name`; return the goals."""
     profile = LinkProfile.parse(spec)
     reference, _ = recording(name).without_stalls(profile)
     results = [compare_one(profile, reference, seed, SIZE_BYTES) for seed in range(seeds)]

@@ -1,19 +1,15 @@
 """Approaches whose outcomes can be computed by hand, and the criteria for outcomes."""
 
 import functools
-import math
 from dataclasses import fields, replace
-from pathlib import Path
-from statistics import NormalDist
 from typing import Any
 
 import numpy as np
 import pytest
 
-from feelahead.lab.approaches.approach import Approach, robot_settings, run_approach
+from feelahead.lab.approaches.approach import Approach, run_approach
 from feelahead.lab.approaches.frozen import ASIDE
 from feelahead.lab.approaches.outcome import SAMPLE_S, Outcome, Trace, reversals, stands
-from robot_side.enlargement.prediction_errors import BUILT_IN, load_prediction_errors
 from tests.helpers.repository import DATA
 
 pytestmark = pytest.mark.long
@@ -73,46 +69,6 @@ def test_a_finger_that_overcomes_the_effect_touches_slowly_whatever_the_delay(li
     # 1 N is left of its force.
     assert outcome.contact_speed_mm_s == pytest.approx(free_speed_mm_s(1.0), abs=3.0)
     assert outcome.reversals == 1
-
-
-def standing_off_mm(link: str) -> float:
-    outcome = run_approach(Approach(DATA / "wall.xml", 2.0, link=link))
-    assert outcome.stops_at_mm is not None
-    return outcome.stops_at_mm
-
-
-@approaches
-def test_where_it_stops_depends_on_the_delay_only_by_what_is_known_of_the_prediction(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    known = load_prediction_errors(BUILT_IN)
-    as_known_mm = standing_off_mm(FAR)
-    path = tmp_path / "none.toml"
-    row = "loop_age_ms = 4\nmu_mm = 0\nsigma_mm = 0\n"
-    path.write_text(f"[[operator]]\n{row}[[robot]]\n{row}")
-    monkeypatch.setattr(
-        "feelahead.lab.approaches.approach.robot_settings",
-        lambda approach: replace(robot_settings(approach), prediction_errors=path),
-    )
-    near_mm, far_mm = standing_off_mm(""), standing_off_mm(FAR)
-    assert far_mm == pytest.approx(near_mm, abs=0.2)
-
-    def sigma_mm(mean_m: float, sd_m: float) -> float:
-        """Return D_σ of eq. 9-10, for a camera error of 3 mm and a much smaller arm error."""
-        return 1e3 * (mean_m + NormalDist().inv_cdf(0.99) * math.hypot(0.003, sd_m))
-
-    wider_mm = sigma_mm(*known.at("operator", 0.404, 0.25)) - sigma_mm(0.0, 0.0)
-    assert 1.0 < wider_mm < 2.0
-    assert as_known_mm == pytest.approx(far_mm + wider_mm, abs=0.2)
-
-
-@approaches
-def test_where_the_robot_side_assists_no_finger_is_too_strong_for_a_wall() -> None:
-    assisted, alone = (ended(force_n=5.0, assist=assist, duration_s=3.5) for assist in ("speed", "none"))
-    assert (assisted.end, assisted.contact_with) == ("stopped", None)
-    assert assisted.least_gap_mm > 5.0
-    assert (alone.end, alone.contact_with) == ("contact", "wall")
-    assert alone.contact_speed_mm_s == pytest.approx(free_speed_mm_s(3.0), abs=3.0)
 
 
 @approaches

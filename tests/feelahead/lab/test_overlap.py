@@ -49,7 +49,6 @@ def test_the_command_prints_its_goals_and_writes_its_files(tmp_path: Path, capsy
     summary = tmp_path / "out.json"
 
     def few(asked: OverlapSweep) -> Iterable[Any]:
-        """Leave out most classes and meshes."""
         kept = {"mesh": "0.1", "accuracy": "face depth", "adversarial": "face depth"}
         return [cell for cell in QUESTION.cells(asked) if kept.get(cell.part, "") in cell.case]
 

@@ -9,13 +9,11 @@ from common.reaction import HORIZON_S
 from feelahead.lab.approaches.evaluation import LINKS
 from feelahead.lab.approaches.frozen import SITE, frozen_scene
 from feelahead.lab.approaches.pulls import PullKind
-from feelahead.lab.approaches.recording import POSE_S, TICK_S, RecordedApproach, record_approach
+from feelahead.lab.approaches.recording import TICK_S, RecordedApproach, record_approach
 from feelahead.lab.approaches.replay import Replay
 from feelahead.lab.approaches.stopping_path import stopping_path
-from robot_side.drivers.mujoco.posed_scene import PosedScene
 from robot_side.drivers.mujoco.scene import load_scene
 from robot_side.settings import EncoderSettings
-from tests.helpers.repository import DATA
 
 pytestmark = pytest.mark.long
 
@@ -50,26 +48,6 @@ def test_what_was_sent_arrives_one_delay_later() -> None:
     assert seen_s.max() < DELAY_S + 0.01
 
 
-@recordings
-def test_the_recorded_pose_moves_on_through_the_wall() -> None:
-    one = recorded()
-    scene = load_scene(DATA / "wall.xml", "tool")
-    posed = PosedScene(scene)
-    gaps_m = []
-    for positions, fingers in zip(one.joint_positions_rad, one.finger_positions, strict=True):
-        posed.set_pose(positions, fingers, np.zeros(3))
-        gaps_m.append(posed.gap_m())
-    resting = one.pose_time_s < one.began_s + DELAY_S
-    np.testing.assert_allclose(np.array(gaps_m)[resting], 0.32, atol=1e-3)
-    assert gaps_m[-1] < -0.01
-    # It moves at the speed of its travel, in the wall as before it, and knows the loop age.
-    pulling = one.pose_time_s > one.began_s + 0.6
-    speeds_m_s = -np.diff(np.array(gaps_m)[pulling & (np.array(gaps_m) > 0.01)]) / POSE_S
-    np.testing.assert_allclose(speeds_m_s, 0.25 * float(one.command[-1]), rtol=0.03)
-    assert one.loop_age_s[pulling].min() >= 2.0 * DELAY_S
-    assert one.loop_age_s[pulling].max() < 2.0 * DELAY_S + 0.04
-
-
 # From a moment until the arm stops
 
 STARTS_S, GOES_S = 0.02, 0.8
@@ -84,22 +62,6 @@ def replayed(pull: PullKind) -> Replay:
 
 def commanded_m_s(replay: Replay) -> float:
     return replay.motion.trigger_speed_m_s * float(replay.record.command[-1])
-
-
-@recordings
-@pytest.mark.parametrize("pull", ["steady", "drift", "yaw"])
-@pytest.mark.parametrize("since_s", [STARTS_S, GOES_S])
-def test_until_it_brakes_it_goes_as_the_arm_went_with_these_commands(pull: PullKind, since_s: float) -> None:
-    replay = replayed(pull)
-    record, time_s = replay.record, replay.record.began_s + since_s
-    times_s, path = stopping_path(replay, time_s, commanded_m_s(replay))
-    goes = times_s <= record.arrives_s(time_s) - time_s + HORIZON_S
-    true = [replay.pose_at(float(time_s + then_s)) for then_s in times_s[goes]]
-    off_m = np.linalg.norm(path.positions_m[goes] - [pose.tool_position_m for pose in true], axis=1)
-    # The finger itself needs 0.1 s to reach its force.
-    assert off_m.max() < (0.003 if since_s == STARTS_S else 0.0001)
-    turned = path.rotations[goes] @ np.swapaxes([pose.tool_rotation for pose in true], 1, 2)
-    assert np.arccos(np.clip((np.trace(turned, axis1=1, axis2=2) - 1.0) / 2.0, -1.0, 1.0)).max() < 0.01
 
 
 @recordings

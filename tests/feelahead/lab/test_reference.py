@@ -3,93 +3,17 @@
 import math
 from dataclasses import replace
 from fractions import Fraction
-from itertools import pairwise
-from typing import Any
 
 import numpy as np
 import pytest
-from mpmath import mp, mpf
 
 from common.arrays import FloatArray
 from feelahead.lab.reference.classes import MAKERS, frozen_class, frozen_classes
-from feelahead.lab.reference.contact import contacts, exact_contact, exact_corners
+from feelahead.lab.reference.contact import contacts, exact_contact
 from feelahead.lab.reference.errors import count_failures
 from feelahead.lab.reference.oracle import Truth, true_mesh_overlap, true_overlap, true_overlaps
-from feelahead.lab.reference.pairs import BOX_QUADRILATERALS, Pairs
+from feelahead.lab.reference.pairs import Pairs
 from tests.helpers.meshes import TETRAHEDRON_TRIANGLES
-
-Point = list[Any]
-
-
-def crossing(a: Point, b: Point, radius: Any) -> tuple[Any, Any] | None:
-    """Return from which to which share of the way from a to b the segment is inside the ball at the origin."""
-    step = [y - x for x, y in zip(a, b, strict=True)]
-    length_2, half = sum(x * x for x in step), sum(x * y for x, y in zip(a, step, strict=True))
-    inside = half**2 - length_2 * (sum(x * x for x in a) - radius**2)
-    if inside <= 0:
-        return None
-    enter, leave = ((-half + sign * mp.sqrt(inside)) / length_2 for sign in (-1, 1))
-    return (max(enter, 0), min(leave, 1)) if max(enter, 0) < min(leave, 1) else None
-
-
-def slice_area(rings: list[list[Point]], z: Any, radius: Any) -> Any:
-    """Return the area that the convex solid and the ball at the origin share in the plane at height z."""
-    disc = mp.sqrt(max(mpf(0), radius**2 - z**2))
-
-    def sector(p: Point, q: Point) -> Any:
-        return disc**2 / 2 * mp.atan2(p[0] * q[1] - p[1] * q[0], p[0] * q[0] + p[1] * q[1])
-
-    total = mpf(0)
-    for ring in rings:
-        ends = {}
-        for a, b in pairwise([*ring, ring[0]]):
-            if (a[2] > z) != (b[2] > z):
-                share = (z - a[2]) / (b[2] - a[2])
-                ends[a[2] > z] = [x + share * (y - x) for x, y in zip(a[:2], b[:2], strict=True)]
-        if len(ends) == 2:
-            p, q = ends[True], ends[False]
-            cut = crossing(p, q, disc)
-            inner = [[x + at * (y - x) for x, y in zip(p, q, strict=True)] for at in cut or ()]
-            total += sector(p, q) if cut is None else sector(p, inner[0]) + sector(inner[1], q)
-            total += (inner[0][0] * inner[1][1] - inner[0][1] * inner[1][0]) / 2 if inner else 0
-    return abs(total)
-
-
-def volume_by_slices(pairs: Pairs) -> Any:
-    """Return the overlap of the first pair, as the integral of the area of its horizontal slices."""
-    radius, center = mpf(float(pairs.radii[0])), [mpf(float(x)) for x in pairs.centers[0]]
-    faces = TETRAHEDRON_TRIANGLES.tolist() if pairs.solid == "tetrahedron" else BOX_QUADRILATERALS
-    corners = [
-        [mpf(x.numerator) / x.denominator - c for x, c in zip(corner, center, strict=True)]
-        for corner in exact_corners(pairs, 0)
-    ]
-    rings = [[corners[index] for index in face] for face in faces]
-    levels = {-radius, radius, *(corner[2] for corner in corners)}
-    for ring in rings:
-        for a, b in pairwise([*ring, ring[0]]):
-            levels.update(a[2] + at * (b[2] - a[2]) for at in crossing(a, b, radius) or ())
-        sides = [[y - x for x, y in zip(ring[0], other, strict=True)] for other in ring[1:3]]
-        normal = [sides[0][i - 2] * sides[1][i - 1] - sides[0][i - 1] * sides[1][i - 2] for i in range(3)]
-        normal = [x / mp.sqrt(sum(y * y for y in normal)) for x in normal]
-        height = sum(x * y for x, y in zip(normal, ring[0], strict=True))
-        rise = mp.sqrt(max(mpf(0), (radius**2 - height**2) * (1 - normal[2] ** 2)))
-        levels.update((height * normal[2] + rise, height * normal[2] - rise))
-    low, high = max(-radius, min(c[2] for c in corners)), min(radius, max(c[2] for c in corners))
-    inner = sorted(level for level in levels if low <= level <= high)
-    parts = [[a, b] for a, b in pairwise(inner) if b - a > mpf("1e-22") * radius]
-    return sum(mp.quad(lambda z: slice_area(rings, z, radius), part) for part in parts)
-
-
-@pytest.mark.parametrize("solid", ["tetrahedron", "box"])
-@pytest.mark.parametrize("name", ["random", "centre on edge", "solid swallowed", "R/L 1e-1", "tangent inside"])
-def test_the_oracle_integrates_the_definition(solid: str, name: str) -> None:
-    pairs = next(
-        pairs
-        for seed in range(9)
-        if true_overlap(pairs := frozen_class(solid, name, 1, seed=seed)[1], 0).volume > 1e-6 * pairs.sphere_volumes[0]
-    )
-    with mp.workdps(25):
-        assert abs(volume_by_slices(pairs) - true_overlap(pairs, 0).volume) <= 1e-17 * pairs.sphere_volumes[0]
 
 
 @pytest.mark.parametrize("solid", MAKERS)

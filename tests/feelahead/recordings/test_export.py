@@ -28,10 +28,8 @@ from feelahead.commands.recordings import export, plot
 from feelahead.recordings.demonstrations import Picture, read_demonstrations, read_pictures
 from feelahead.recordings.lerobot import _of_one_size
 from feelahead.recordings.playback import Seen, seen
-from feelahead.recordings.replay_robot import replay_robot
 from feelahead.recordings.tables import read_tables
 from tests.feelahead.recordings.conftest import record_pictures
-from tests.helpers.recordings.forms import FORMS, rewritten
 
 pyarrow = pytest.importorskip("pyarrow")
 parquet = pytest.importorskip("pyarrow.parquet")
@@ -163,40 +161,36 @@ def test_lerobot_says_how_old_pictures_are_and_how_many_there_are(
     assert (np.diff(ages_s)[~again] < 0.0).all()
 
 
-def test_an_operator_side_alone_knows_by_its_clock_offset_how_old_a_picture_is(tmp_path: Path) -> None:
-    path = tmp_path / "operator.mcap"
+def operators(path: Path, *frames: tuple[float, float | None, VideoFrame]) -> Recording:
+    """Record frames at an operator side alone, each at its time, with the clock's offset that is known by then."""
     file = RecordingFile(path, 0.0)
     content = Content(file)
     content.take(0, HEADER + as_json({"side": "operator"}))
-    for number, offset_s in enumerate((None, 500.0)):
-        now_s = 10.0 + number
+    for now_s, offset_s, frame in frames:
         content.take(0, STATUS + stamped(now_s) + as_json({"offset_s": offset_s}))
-        captured_s = now_s + 500.0 - 0.07  # on the robot side's clock; sent 20 ms later, 50 ms under way
-        frame = VideoFrame(Header(1, number + 1, captured_s + 0.02), "overview", captured_s, 32, 24, b"jpeg")
         content.take(0, VIEW + stamped(now_s) + encode(frame))
     file.close()
+    return open_recording(path)
 
-    found = read_pictures(open_recording(path))["overview"]
 
+def test_an_operator_side_alone_knows_by_its_clock_offset_how_old_a_picture_is(tmp_path: Path) -> None:
+    sent = []
+    for number, offset_s in enumerate((None, 500.0)):
+        now_s = 10.0 + number
+        captured_s = now_s + 500.0 - 0.07  # on the robot side's clock; sent 20 ms later, 50 ms under way
+        frame = VideoFrame(Header(1, number + 1, captured_s + 0.02), "overview", captured_s, 32, 24, b"jpeg")
+        sent.append((now_s, offset_s, frame))
+    found = read_pictures(operators(tmp_path / "operator.mcap", *sent))["overview"]
     # While the offset is unknown, only the time until it was sent counts.
     assert [one.time_s - one.captured_s for one in found] == pytest.approx([0.02, 0.07], abs=1e-6)
 
 
 def test_pictures_that_arrived_at_one_moment_keep_their_own_messages(tmp_path: Path) -> None:
-    path = tmp_path / "operator.mcap"
-    file = RecordingFile(path, 0.0)
-    content = Content(file)
-    content.take(0, HEADER + as_json({"side": "operator"}))
     sent = [
         VideoFrame(Header(1, number, 10.0), "overview", 10.0 - age_s, 32, 24, jpeg)
         for number, (age_s, jpeg) in enumerate(((0.07, b"first"), (0.03, b"second")), start=1)
     ]
-    for frame in sent:
-        content.take(0, VIEW + stamped(1.0) + encode(frame))
-    file.close()
-
-    recording = open_recording(path)
-
+    recording = operators(tmp_path / "operator.mcap", *((1.0, None, frame) for frame in sent))
     assert [decode_view(one.content) for one in seen(recording)] == sent
     found = read_pictures(recording)["overview"]
     assert [one.jpeg for one in found] == [b"first", b"second"]
@@ -331,26 +325,6 @@ def test_lerobot_reads_what_its_own_writer_wrote(
     assert ((ages_s >= 0.0) & (ages_s < 0.2)).all()
     assert [*read.meta.video_keys] == ["observation.images.overview"]
     assert len(list((folder / "videos").rglob("*.mp4"))) == 1
-
-
-@pytest.mark.parametrize("form", ["newest first, without chunks", "shuffled", "two channels for each topic"])
-def test_a_recording_that_another_tool_wrote_again_gives_the_same_files(
-    with_pictures: tuple[Recording, list[bytes]], tmp_path: Path, form: str
-) -> None:
-    recording, _ = with_pictures
-    (tmp_path / "other").mkdir()
-    other = tmp_path / "other" / recording.path.name
-    other.write_bytes(rewritten(recording.path, **FORMS[form]))
-    again = open_recording(other)
-
-    def files(run: Recording, kind: str) -> dict[str, bytes]:
-        folder = exported(run, kind, run.path.with_name(kind))
-        return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
-
-    for kind in ("csv", "parquet", "lerobot"):
-        assert files(again, kind) == files(recording, kind)
-    assert list(seen(again)) == list(seen(recording))
-    assert replay_robot(again).lines() == replay_robot(recording).lines()
 
 
 def test_fps_is_for_lerobot_alone(run: Recording) -> None:
