@@ -5,8 +5,6 @@ from robot_side.arm.port import Arm, ArmState
 
 
 class PassedOnArm(Arm):
-    """Arm that passes all calls on to `arm`; subclasses override some."""
-
     joint_count = 0
 
     def __init__(self, arm: Arm) -> None:

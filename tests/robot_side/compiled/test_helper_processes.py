@@ -1,6 +1,7 @@
 """Compilation in helper processes: how kernels are shared out, which files are stored, and failures."""
 
 import os
+import select
 import signal
 from collections.abc import Sequence
 from pathlib import Path
@@ -14,6 +15,7 @@ from robot_side.compiled.helper_processes import KernelQueue, compile_in_helpers
 from robot_side.compiled.kernel import Compiled, imported_kernels
 from robot_side.compiled.sources import code_sizes
 from robot_side.compiled.warm_up import warm_up
+from tests.helpers.machines.waiting import LIMIT_S
 from tests.robot_side.compiled.fresh_kernels import NAMES, fresh_kernels
 
 
@@ -74,6 +76,18 @@ def test_a_process_that_is_killed_leaves_the_rest_to_us(tmp_path: Path, monkeypa
     warm_up(kernels=fresh)
     assert [kernel.cache_hits for kernel in fresh] == [0, 0, 0]
     assert all(kernel.is_kept for kernel in fresh)
+
+
+@pytest.mark.processes
+def test_a_helper_ends_with_its_owner_even_in_a_compilation(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    with Companion("robot_side.compiled.helper_processes") as helper:
+        helper.channel.send(max(ours(), key=lambda kernel: size([kernel])).name.encode())
+        ended = os.pidfd_open(helper.process_id)
+        helper.channel.close()
+        assert select.select([ended], [], [], LIMIT_S)[0]
+        os.close(ended)
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_without_a_place_to_keep_it_no_process_is_started(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -22,8 +22,8 @@ def thing(kind: str, face_m: float, x_m: float = 0.0, rotation: FloatArray | Non
     """Return an object whose nearest point is `face_m` ahead of the origin; thin ones lie across, at x_m."""
     turned = np.eye(3) if rotation is None else rotation
     half_m = {"wall": (0.6, 0.6, 0.05), "plate": (0.1, 0.1, 0.001)}
-    half_m |= {f"{mm} mm rod": (5e-4 * mm, 0.3, 5e-4 * mm) for mm in (10, 5, 2, 1, 0.4)}
-    radii_m = {"ball": 0.04, "marble": 0.0075, "pea": 0.003}
+    half_m |= {f"{mm} mm rod": (5e-4 * mm, 0.3, 5e-4 * mm) for mm in (10, 5, 2, 1)}
+    radii_m = {"ball": 0.04, "marble": 0.0075}
     scene = Scene().add()
     if kind == "half-space":
         return scene.half_space(-turned @ AHEAD, -face_m).objects()
@@ -66,14 +66,3 @@ def test_a_wall_that_is_touched_exactly_without_any_doubt_is_felt() -> None:
             onsets = ways_of(ball_pose(), thing(kind, RADIUS_M + gap_m), along())
             assert -MARGIN_M < onsets[0] < -0.009
             assert -0.0027 < onsets[7] <= gap_m
-
-
-@pytest.mark.parametrize("gap_m", [0.0, 0.002, 0.005])
-def test_a_ball_that_the_inflated_sphere_has_swallowed_is_felt(gap_m: float) -> None:
-    inflated_m = gap_m + 2.0 * 0.003 + 0.001
-    onsets = ways_of(ball_pose(), thing("pea", RADIUS_M + gap_m), along(AHEAD, inflated_m))
-    free_m = gap_m - inflated_m
-    assert free_m - MARGIN_M < onsets[0] < onsets[7] < free_m
-    # From behind it is not.
-    behind = Scene().add().sphere([0.0, 0.0, -RADIUS_M - gap_m - 0.003], 0.003).objects()
-    assert np.isinf(ways_of(ball_pose(), behind, along(AHEAD, inflated_m))).all()

@@ -135,15 +135,6 @@ def test_fingers_that_rest_do_not_move_however_their_readings_shake() -> None:
         assert not fingers_m_s(kept, free_pose(centers.tolist(), [RADIUS_M, RADIUS_M]), tick * 0.01).any()
 
 
-def test_what_is_gripped_or_let_go_while_the_gripper_drifts_changes_nothing_but_the_spheres() -> None:
-    law, objects = swept(), post(0.04, 0.08)
-    rates = np.array([0.1, 0.0, 0.2, 0.0, 0.0, 0.0])
-    one, two = free_pose([[0.0] * 3], [RADIUS_M]), free_pose([[0.0] * 3, [0.0, 0.0, -0.02]], [RADIUS_M, RADIUS_M])
-    for tick, pose in enumerate([one, one, two, two, one, two] * 8):
-        situation_ = situation(pose, objects, joint_velocities_rad_s=rates, loop_age_s=LOOP_S)
-        assert law.sense(situation_, tick * 0.001).r2.fast_m[7] < 0.1
-
-
 # Places
 
 

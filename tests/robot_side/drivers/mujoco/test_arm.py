@@ -148,6 +148,16 @@ def test_a_joint_that_was_pushed_away_does_not_spring_back(tmp_path: Path) -> No
     assert fastest < 0.5
 
 
+def test_an_input_that_nothing_drives_rests(tmp_path: Path) -> None:
+    actuators = POSITION_SERVOS + '<damper name="brake" joint="elbow" kv="500" ctrlrange="0 1"/>'
+    home = '<keyframe><key name="home" qpos="0.4 -1 0 0" ctrl="0.4 -1 1 0"/></keyframe>'
+    scene = load_scene(planar_arm(tmp_path, arm_actuators=actuators, extra_bottom=COUPLING + home), "tcp")
+    arm = perfect_arm(scene)
+    arm.command(np.array([0.0, 0.5]), 1.0)
+    assert arm.state(0.0).time_s == 0.0
+    assert arm.state(0.5).joint_velocities_rad_s[1] == pytest.approx(0.5, rel=0.02)
+
+
 @pytest.mark.parametrize("kind", ["BADQPOS", "BADQVEL", "BADQACC", "CONTACTFULL", "BADCTRL"])
 def test_of_mujocos_warnings_three_say_that_it_is_unstable(kind: str) -> None:
     scene = load_scene()
