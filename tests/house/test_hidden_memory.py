@@ -20,7 +20,6 @@ CHANGES = {
 
 
 def changed(tree: ast.Module) -> set[str]:
-    """Return the names of top-level variables that functions of the module change."""
     top = {name for line in tree.body for name in _named(line)}
     functions = [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)]
     return {name for function in functions for name in _changed_by(function) if name in top}

@@ -48,7 +48,6 @@ class Placing(Bench):
 
     @property
     def pressed_n(self) -> float:
-        """Force with which the held box is pressed on the table, in newtons."""
         assert self.robot.newest is not None
         carried = carried_n(self.robot.newest[1].pose.tool_jacobian, self.simulated.state(self.now_s).joint_loads_nm)
         assert carried is not None

@@ -8,10 +8,11 @@ from robot_side.core import RobotSide
 from robot_side.parts import build_parts
 from robot_side.settings import RobotSettings
 from robot_side.tick_times import PhysicsTime
+from tests.robot_side.drivers.mujoco.test_arm import SlowMachine
 
 
 def test_a_timed_core_sends_what_a_plain_one_does_and_its_physics_are_timed() -> None:
-    physics = PhysicsTime(Ticking(), 0)
+    physics = PhysicsTime(SlowMachine(1e-6), 0)
     plain, timed = (build_parts(RobotSettings(), 1, "clock") for _ in range(2))
     without, with_times = RobotSide(plain), RobotSide(timed, [physics])
     for turn in range(30):
@@ -21,14 +22,3 @@ def test_a_timed_core_sends_what_a_plain_one_does_and_its_physics_are_timed() ->
     assert np.array_equal(timed.scene.data.qpos, plain.scene.data.qpos)
     assert physics.took.count == 30
     assert microseconds(physics.took) == pytest.approx({"p50": 1.0, "p99": 1.0, "max": 1.0})
-
-
-class Ticking:
-    """Stand-in for the clock that advances by a microsecond with each reading."""
-
-    def __init__(self) -> None:
-        self._reads = 0
-
-    def now(self) -> float:
-        self._reads += 1
-        return 1e-6 * self._reads

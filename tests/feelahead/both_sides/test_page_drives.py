@@ -35,7 +35,6 @@ def run_of(does: Does, device: Any = "browser", link: str = "", *, robot: RobotS
 
 
 def timetable(*rows: tuple[float, dict[str, Any] | None]) -> Does:
-    """Return the page's inputs over time: each row's inputs hold until the row's time."""
     return lambda now_s: next((hands for until_s, hands in rows if now_s < until_s), rows[-1][1])
 
 

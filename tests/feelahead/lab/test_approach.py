@@ -187,11 +187,9 @@ def test_an_end_that_says_nothing_of_the_law_fails_and_is_drawn_as_well(runs: Ma
     [
         (["--force", "3", "inf"], "force[1] = inf", "0 to 20"),
         (["--force"], "--force", "one value or more"),
-        (["--link", "dealy 5ms"], "dealy", "delay"),
         (["--link", "to_robot: delay 1500ms; to_operator: delay 600ms"], "2.1 s", "below 2 s"),
         (["--law", "swept_robot"], "swept_robot", "swept"),
         (["--stick", "1", "0.1"], "--stick (1.0, 0.1)", "is longer than 1"),
-        (["--turn", "nan", "0"], "--turn (nan, 0.0)", "is longer than 1"),
         (["--picture", "out.xyz"], "out.xyz", "png"),
         (["--model", WALL, "no_such.xml"], "no_such.xml: there is no such file", "MJCF"),
     ],

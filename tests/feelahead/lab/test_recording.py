@@ -9,7 +9,7 @@ from common.reaction import HORIZON_S
 from feelahead.lab.approaches.evaluation import LINKS
 from feelahead.lab.approaches.frozen import SITE, frozen_scene
 from feelahead.lab.approaches.pulls import PullKind
-from feelahead.lab.approaches.recording import TICK_S, RecordedApproach, record_approach
+from feelahead.lab.approaches.recording import POSE_S, TICK_S, RecordedApproach, record_approach
 from feelahead.lab.approaches.replay import Replay
 from feelahead.lab.approaches.stopping_path import stopping_path
 from robot_side.drivers.mujoco.scene import load_scene
@@ -71,7 +71,9 @@ def test_an_arm_that_goes_brakes_from_the_zones_speed_and_one_that_starts_has_to
     for since_s in (0.0, GOES_S):
         time_s = replay.record.began_s + since_s
         arrives_s = replay.record.arrives_s(time_s)
-        path = stopping_path(replay, time_s, speed_m_s)[1]
+        times_s, path = stopping_path(replay, time_s, speed_m_s)
+        assert np.diff(times_s).max() < POSE_S + 1e-9
+        np.testing.assert_array_equal(path.positions_m[0], replay.pose_at(time_s).tool_position_m)
         reached_m = replay.pose_at(arrives_s).tool_position_m
         ends_m.append(float((path.positions_m[-1] - reached_m) @ replay.axis) - speed_m_s * HORIZON_S)
     starts_m, goes_m = ends_m

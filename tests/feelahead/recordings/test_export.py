@@ -42,7 +42,6 @@ LEROBOT = "lerobot.datasets.lerobot_dataset"
 
 @pytest.fixture(autouse=True)
 def without_lerobot(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let LeRobot's own writer be missing, whatever is installed."""
     monkeypatch.setitem(sys.modules, LEROBOT, None)
 
 

@@ -41,7 +41,6 @@ class Lagging:
     start_rad: float = 0.0
 
     def drive(self, commands: FloatArray) -> "Driven":
-        """Command one row (n,) in each tick."""
         following = Following(LIMITS, NAMES, max(2e-4, self.resolution_rad / math.sqrt(12.0)))
         driven, random = Driven(following), np.random.default_rng(1)
         under_way, states = deque([NOTHING] * round(self.delay_s / TICK_S)), deque[tuple[float, ArmState]]()
@@ -76,8 +75,6 @@ class Lagging:
 
 @dataclass
 class Driven:
-    """What a judge said while an arm was driven."""
-
     following: Following
     said: list[tuple[float, str]] = field(default_factory=list)
     stops: list[tuple[float, str]] = field(default_factory=list)
@@ -89,7 +86,6 @@ class Driven:
 
 
 def steady(*velocity: float, seconds: float = 2.0) -> FloatArray:
-    """Return commands that begin at DRIVEN_S."""
     commands = np.tile(np.array(velocity), (round(seconds / TICK_S), 1))
     commands[: round(DRIVEN_S / TICK_S)] = 0.0
     return commands

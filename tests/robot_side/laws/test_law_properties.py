@@ -22,7 +22,7 @@ def thing(kind: str, face_m: float, x_m: float = 0.0, rotation: FloatArray | Non
     """Return an object whose nearest point is `face_m` ahead of the origin; thin ones lie across, at x_m."""
     turned = np.eye(3) if rotation is None else rotation
     half_m = {"wall": (0.6, 0.6, 0.05), "plate": (0.1, 0.1, 0.001)}
-    half_m |= {f"{mm} mm rod": (5e-4 * mm, 0.3, 5e-4 * mm) for mm in (10, 5, 2, 1)}
+    half_m |= {f"{mm} mm rod": (5e-4 * mm, 0.3, 5e-4 * mm) for mm in (10, 5, 2, 1, 0.4)}
     radii_m = {"ball": 0.04, "marble": 0.0075}
     scene = Scene().add()
     if kind == "half-space":
@@ -66,3 +66,9 @@ def test_a_wall_that_is_touched_exactly_without_any_doubt_is_felt() -> None:
             onsets = ways_of(ball_pose(), thing(kind, RADIUS_M + gap_m), along())
             assert -MARGIN_M < onsets[0] < -0.009
             assert -0.0027 < onsets[7] <= gap_m
+
+
+def test_a_graze_is_felt_by_its_share_of_the_least_volume() -> None:
+    """A hair through a fingertip's sphere has less volume than V_min, a cap of 0.5 mm: only weak strengths are felt."""
+    hair = thing("0.4 mm rod", RADIUS_M + INFLATED_M + FREE_M)
+    assert np.isfinite(ways_of(ball_pose(), hair, along(AHEAD, INFLATED_M))).sum() == 3

@@ -1,5 +1,7 @@
 """The stick's rumble, and how roles and a held object change the fields."""
 
+import math
+
 import numpy as np
 import pytest
 
@@ -72,6 +74,11 @@ def test_it_is_the_strength_at_what_a_reaction_and_the_loop_age_take_in_eighths(
         # The first strength begins 9 mm or more before the contact distance, the last less than 3 mm before it.
         assert found[int(np.searchsorted(gaps, here))] == 1.0
         assert 0.009 < gaps[int(np.argmin(found))] - here < 0.012
+
+
+def test_a_deflection_is_of_both_axes_and_ends_at_1() -> None:
+    diagonal = Scene().add().half_space([-math.sqrt(0.5), math.sqrt(0.5), 0.0], -RADIUS_M - SIGMA_M - 0.05).objects()
+    assert rumble(diagonal, (1.0, 1.0)) == rumble(diagonal, (math.sqrt(0.5), math.sqrt(0.5)))
 
 
 def test_a_stick_that_leads_slowly_to_what_is_to_be_touched_rumbles_half_at_most() -> None:

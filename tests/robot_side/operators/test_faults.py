@@ -23,7 +23,6 @@ Patch = Callable[[pytest.MonkeyPatch], None]
 
 
 def cruising() -> tuple[Bench, Operator]:
-    """Return a robot side, and the operator who moves its arm at an even speed."""
     bench = Bench()
     operator = bench.join(2)
     bench.cruise(operator)

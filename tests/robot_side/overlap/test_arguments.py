@@ -132,7 +132,6 @@ def test_wrong_shapes_are_refused(kind: str, name: str) -> None:
         ("sphere", "radii", [1.0, -0.25], r"\[1\] = -0\.25 is out of range; valid: finite, 0 to 1e\+50 m$"),
         ("box", "box_half_sizes", [[1.0] * 3, [-0.25] * 3], r"\[1, 0\] = -0\.25 is out of range; valid: finite, 0 to"),
         ("sphere", "radii", "far", " has the type .*; valid: real numbers"),
-        ("sphere", "radii", None, " has the type .*; valid: real numbers"),
         ("sphere", "radii", True, " has the type .*; valid: real numbers"),
         (
             "tetrahedron",
@@ -145,13 +144,6 @@ def test_wrong_shapes_are_refused(kind: str, name: str) -> None:
             r"\[1\] = \[0\.0, 0\.0, 0\.0\] is out of range; valid: a vector",
         ),
         ("box", "box_rotations", 2.0 * np.eye(3), r" = \[\[.*\]\] is out of range; valid: an orthonormal"),
-        ("box", "box_rotations", np.zeros((3, 3)), r" = \[\[.*\]\] is out of range; valid: an orthonormal"),
-        (
-            "box",
-            "box_rotations",
-            np.eye(3) + 1e-6 * np.eye(3, k=1),
-            r" = \[\[.*\]\] is out of range; valid: an orthonormal",
-        ),
     ],
 )
 def test_what_is_refused(kind: str, name: str, value: object, said: str) -> None:

@@ -23,7 +23,6 @@ def two(shift: float, size: float) -> npt.NDArray[np.float64]:
     ("vertices", "triangles", "text"),
     [
         (TETRAHEDRON[:, :2], TETRAHEDRON_TRIANGLES, "vertices has the shape (4, 2)"),
-        (TETRAHEDRON[None], TETRAHEDRON_TRIANGLES, "vertices has the shape (1, 4, 3)"),
         (WITH_NAN, TETRAHEDRON_TRIANGLES, "vertices[2, 1] = nan"),
         (TETRAHEDRON, TETRAHEDRON_TRIANGLES[:, :2], "triangles has the shape (4, 2)"),
         (TETRAHEDRON, TETRAHEDRON_TRIANGLES[:0], "triangles has the shape (0, 3)"),

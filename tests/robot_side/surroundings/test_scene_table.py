@@ -79,7 +79,6 @@ def moved(objects: PerceivedObjects, rng: np.random.Generator) -> PerceivedObjec
 
 
 def frame_of(movers: Movers, objects: PerceivedObjects) -> PerceivedObjects:
-    """Return a frame in which moving objects are as in `objects`, and all others as in the first frame."""
     return movers.frame(0.0, movers.numbers_in(objects), objects.roles)
 
 

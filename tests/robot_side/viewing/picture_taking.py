@@ -84,7 +84,6 @@ class PictureTaker:
 
 @contextmanager
 def picture_taker(scene: Scene, viewpoints_of: dict[ViewName, Viewpoint] | None = None) -> Iterator[PictureTaker]:
-    """Start a companion; yield a picture taker that uses it."""
     with Companion(MODULE) as companion:
         yield PictureTaker(scene, companion, viewpoints_of or viewpoints(scene))
 
@@ -107,7 +106,6 @@ def project(scene: Scene, viewpoint: Viewpoint, point_m: FloatArray) -> tuple[fl
 
 
 def around(image: Image, pixel: tuple[int, int], by: int = 2) -> FloatArray:
-    """Return the mean colour (3,) of the pixels at most `by` rows and columns from `pixel`."""
     row, column = pixel
     mean: FloatArray = image[row - by : row + by + 1, column - by : column + by + 1].reshape(-1, 3).mean(axis=0)
     return mean

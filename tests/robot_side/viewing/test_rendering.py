@@ -21,7 +21,6 @@ def place_target(scene: Scene, position_m: FloatArray) -> None:
 
 
 def is_green(color: FloatArray) -> bool:
-    """Return whether a colour (3,) is the target's green, in any light."""
     return bool(color[1] > 1.4 * color[0] and color[1] > 1.4 * color[2] and color[1] > 30.0)
 
 

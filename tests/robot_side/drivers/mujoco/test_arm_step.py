@@ -21,8 +21,6 @@ SPRING = '<joint name="elbow" stiffness="3" springref="-40"'
 
 
 class PlainReference:
-    """Reference motion of the arm's joints, computed in plain NumPy."""
-
     def __init__(
         self, position: FloatArray, ends: tuple[FloatArray, FloatArray], windup: FloatArray, yields: FloatArray
     ) -> None:
@@ -57,8 +55,6 @@ class PlainReference:
 
 
 class PlainGripper:
-    """Reference, opening and grip of the gripper, computed in plain NumPy from its measured travel."""
-
     def __init__(self, travel: GripperTravel) -> None:
         self.travel = travel
         self.reference = self.speed = self.standing_s = self.opening_m = 0.0
