@@ -2,19 +2,21 @@
 
 import json
 import os
+import re
 import signal
 import sys
 import threading
 import webbrowser
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
+from unittest.mock import Mock
 
 import pytest
 
 from common.command.command_line import given_fields, parse_settings
 from common.command.status import Status
 from common.errors import ConfigurationError
+from feelahead.both_sides.processes import SideFailedError
 from feelahead.both_sides.summary import merge_summaries
 from feelahead.commands import open_browser
 from feelahead.commands.demo import command as module
@@ -104,6 +106,27 @@ def test_a_link_over_which_the_sides_cannot_meet_is_the_reason() -> None:
     assert too_slow(DemoSettings(link="to_robot: delay 31s")) is not None
 
 
+@pytest.mark.parametrize(
+    ("fault", "said"), [(SideFailedError("code -9"), "code -9"), (None, "the robot side ended early")]
+)
+def test_a_side_that_ends_is_an_error(fault: SideFailedError | None, said: str) -> None:
+    side = Mock(running=False, check=Mock(side_effect=fault), events=list)
+    side.name = "robot"
+    assert run._watch(DemoSettings(), side, side, Mock(is_set=False), Status("none", "demo")) == [said]
+
+
+@pytest.mark.processes
+def test_a_reader_that_has_seen_enough_ends_the_demo_quietly() -> None:
+    with start("-m", "feelahead", "demo", "--duration", "60", "--status", "json") as process:
+        assert process.stdout is not None
+        assert process.stderr is not None
+        assert json.loads(process.stdout.readline())["event"] == "note"
+        process.stdout.close()
+        complaint = process.stderr.read()
+        code = process.wait(timeout=600)
+    assert (code, complaint) == (0, "")
+
+
 @pytest.mark.processes
 def test_ctrl_c_while_a_side_still_starts_ends_the_demo_at_once(tmp_path: Path) -> None:
     with start(
@@ -127,7 +150,7 @@ def test_the_demo_is_drawn_from_the_facts_of_both_sides_and_gives_the_terminal_b
     try:
         # The delay and the zones are the operator side's, the nearest object and the ticks the robot side's.
         for said in (b"starting", b"link ", b" mean ", b"R2 advances", b"nearest ", b"tick p99", b"ARMED"):
-            demo.read_until(_shows(said))
+            demo.read_until(re.compile(re.escape(said)).search)
         assert demo.end() == 0
         assert b"contacts with obstacles" in demo.seen
         assert demo.is_put_back()
@@ -135,10 +158,6 @@ def test_the_demo_is_drawn_from_the_facts_of_both_sides_and_gives_the_terminal_b
         assert b"feelahead demo: delay: " in demo.seen.rpartition(b"\x1b[?1049l")[2]
     finally:
         demo.close()
-
-
-def _shows(said: bytes) -> Callable[[bytes], bool]:
-    return lambda seen: said in seen
 
 
 ADDRESS = "http://127.0.0.1:1/token/"

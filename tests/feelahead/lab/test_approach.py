@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from feelahead.lab.approaches.approach import Approach
+from feelahead.lab.approaches.approach import Approach, robot_settings
 from feelahead.lab.approaches.frozen import AHEAD, ASIDE, frozen_hash
 from feelahead.lab.approaches.laws import LAWS
 from feelahead.lab.approaches.outcome import End, Outcome, Trace
@@ -101,6 +101,8 @@ def test_every_flag_reaches_the_run(runs: MadeUp) -> None:
             camera_sd_m=0.001,
         )
     ]
+    of_robot = robot_settings(runs.asked[0])
+    assert (of_robot.assist, of_robot.law, of_robot.probability, of_robot.seed) == ("speed", "paper", 0.9, 7)
 
 
 @pytest.mark.parametrize(
