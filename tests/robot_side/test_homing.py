@@ -124,7 +124,7 @@ def test_an_object_half_way_refuses_it_though_both_ends_are_free() -> None:
     assert off_rad(bench) == pytest.approx(begun_rad, abs=5e-3)
     assert bench.robot.status(bench.now_s).hindrance is not None
     bench.drive(0.1, operator)
-    camera.objects = ball_at(half_way_m + [0.2, 0.0, 0.0])  # nearer than half of the way is long
+    camera.objects = ball_at(half_way_m + np.array([0.2, 0.0, 0.0]))  # nearer than half of the way is long
     bench.drive(0.5, operator, home=1.0)
     assert off_rad(bench) < begun_rad - 0.05
 

@@ -102,7 +102,7 @@ def test_a_thing_that_is_gripped_where_it_stands_is_lifted_freely_and_noticed_wh
 
 def test_a_hard_contact_is_forgotten_once_the_tool_has_risen() -> None:
     touchdown = Touchdown()
-    stands = []
+    stands = list[bool]()
     for carried, height_m, told_m_s in ((2.0, 0.05, 0.0), (-500.0, 0.05, -0.1), (2.0, 0.06, 0.1), (2.0, 0.059, -0.1)):
         touchdown.update(carried, height_m, told_m_s, 1.0 + 0.01 * len(stands))
         stands.append(touchdown.stands)
