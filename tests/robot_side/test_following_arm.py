@@ -12,7 +12,7 @@ from robot_side.parts import SceneParts, build_parts
 from robot_side.settings import RobotSettings
 from tests.helpers.repository import ROOT
 from tests.robot_side.passed_on_arm import PassedOnArm
-from tests.robot_side.session_bench import QUICK, Bench, Operator
+from tests.robot_side.session_bench import QUICK, TICK_S, Bench, Operator
 
 ELBOW = "joint 3 (elbow)"
 
@@ -148,3 +148,16 @@ def test_pressing_on_a_wall_is_said_and_stops_nothing(blind: bool) -> None:
     assert bench.robot.status(bench.now_s).hindrance is None
     following = bench.robot.summary()["following"]
     assert (following["noticed"] == {}, following["held"] > 0) == (not blind, not blind)
+
+
+def test_starts_turns_stops_and_a_reset_are_no_fault() -> None:
+    bench, operator = armed(nothing)
+    for fields in ({"r2": 1.0}, {}, {"l2": 1.0}, {"r2": 0.3}, {"lateral": (1.0, -0.5)}, {"run": False}):
+        bench.drive(0.4, operator, **fields)
+    bench.drive(0.3, operator, emergency_stop=True)
+    bench.arm.arm.put_back()  # type: ignore[attr-defined]
+    bench.robot.motion.following.restart()
+    bench.drive(0.3, operator)
+    bench.silence(0.3)
+    assert bench.ticks * TICK_S > 3.0
+    assert bench.robot.summary()["following"] == {"noticed": {}, "held": 0}

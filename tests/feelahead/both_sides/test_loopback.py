@@ -1,6 +1,8 @@
 """Both sides in virtual time: a scripted person lifts the target, and feels the stiffness at the triggers."""
 
 import functools
+import itertools
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,6 +15,7 @@ from feelahead.lab.approaches.approach import Approach, PullRun
 from operator_side.controller.feel import USUAL_LIGHT, WARNING_LIGHT
 from operator_side.people.person import SimulatedOperator
 from operator_side.people.pulling_hands import Hands
+from operator_side.people.settings import PersonSettings
 from operator_side.settings import OperatorSettings
 from robot_side.settings import RobotSettings
 from tests.helpers.repository import DATA
@@ -20,6 +23,7 @@ from tests.helpers.repository import DATA
 pytestmark = pytest.mark.long
 
 LOOK_S = 0.05
+ARRIVED = {"to_robot": "motion_received", "to_operator": "stiffness_received"}
 Strengths = tuple[int, ...]
 
 
@@ -34,6 +38,8 @@ episodes = pytest.mark.xdist_group("episodes")
 
 @dataclass(frozen=True)
 class Moment:
+    """What the person does and feels at one time."""
+
     phase: Doing
     l2: Strengths
     r2: Strengths
@@ -83,6 +89,29 @@ def test_the_target_is_reached_grasped_and_lifted(delay_ms: int, compensation: C
 
 @episodes
 @pytest.mark.parametrize("delay_ms", [0, 200])
+def test_what_is_ahead_is_felt_on_the_advancing_trigger_alone(delay_ms: int) -> None:
+    advancing = episode(delay_ms).during(Doing.ADVANCING)
+    assert max(max(moment.l2) for moment in advancing) == 0
+    assert max(max(moment.r2) for moment in advancing) == 8
+    # A released trigger is free until the target is near.
+    assert advancing[0].r2 == (0,) * 10
+    zones = episode(delay_ms).summary["zones"]
+    assert (zones["r2"]["first_stiff"], zones["r2"]["max"]) == (0, 8)
+
+
+@episodes
+@pytest.mark.parametrize("delay_ms", [0, 200])
+def test_the_free_travel_shrinks_as_the_target_comes_nearer(delay_ms: int) -> None:
+    free = [moment.r2.count(0) for moment in episode(delay_ms).during(Doing.ADVANCING)]
+    assert free[0] == 10
+    assert free[-1] <= 1
+    assert all(later <= earlier + 1 for earlier, later in itertools.pairwise(free))
+    # Not at once: the finger is led back zone by zone.
+    assert len(set(free)) >= 6
+
+
+@episodes
+@pytest.mark.parametrize("delay_ms", [0, 200])
 def test_what_is_to_be_touched_never_stops_the_finger_that_touches_it(delay_ms: int) -> None:
     # The slowest zone has at most half of the strength, from the advance until the target is held.
     before = [moment for moment in episode(delay_ms).moments if not moment.held]
@@ -102,6 +131,49 @@ def test_what_is_held_is_felt_no_more_and_the_table_is(delay_ms: int) -> None:
     assert len(free) >= 0.9 * len(lifting)
     assert all(moment.r2[:2] == (0,) * 2 for moment in lifting)
     assert lifting[0].r2[-1] == 8
+
+
+@episodes
+@pytest.mark.parametrize("delay_ms", [0, 200])
+def test_each_direction_measures_the_delay_that_was_asked_for(delay_ms: int) -> None:
+    summary = episode(delay_ms).summary
+    spread_ms = 10.0 if delay_ms else 0.0
+    for direction in ("to_robot", "to_operator"):
+        measured = summary["delay_ms"][direction]
+        # The achieved delays of these few hundred messages; the measurement is exact, except for a tick's waiting.
+        achieved = summary["link"][direction]["achieved"]["delay_ms"]
+        within = 4.0 * spread_ms / math.sqrt(summary["messages"][ARRIVED[direction]])
+        assert achieved["mean"] == pytest.approx(delay_ms, abs=within)
+        assert achieved["sd"] == pytest.approx(spread_ms, abs=within)
+        assert measured["mean"] == pytest.approx(achieved["mean"], abs=0.1)
+        assert measured["sd"] == pytest.approx(achieved["sd"], abs=0.1)
+    # Latest wins: the applied messages are the quicker part of the arrivals.
+    if delay_ms:
+        assert summary["applied_age_ms"]["to_operator"]["mean"] < summary["delay_ms"]["to_operator"]["mean"]
+
+
+def without_times(summary: dict[str, Any]) -> dict[str, Any]:
+    return {key: value for key, value in summary.items() if key != "tick_us"}
+
+
+def test_the_same_seed_gives_the_same_numbers() -> None:
+    def run(seed: int) -> dict[str, Any]:
+        both = loopback("delay 30ms 10ms", seed=seed)
+        both.run_until(2.0)
+        return without_times(both.summary())
+
+    first = run(7)
+    assert run(7) == first
+    assert run(8) != first
+
+
+def test_time_may_pass_in_any_steps() -> None:
+    whole, pieces = loopback("delay 20ms 5ms"), loopback("delay 20ms 5ms")
+    whole.run_until(2.0)
+    for milliseconds in range(0, 2001, 13):
+        pieces.run_until(milliseconds / 1000)
+    pieces.run_until(2.0)
+    assert without_times(whole.summary()) == without_times(pieces.summary())
 
 
 def test_a_person_who_is_blind_for_a_moment_lets_go_and_then_goes_on() -> None:
@@ -143,3 +215,16 @@ def test_a_hand_that_pulls_on_through_it_moves_nothing_before_it_has_let_go() ->
     assert max(map(abs, speeds_mm_s(2.3, began_s + 1.8))) < 1.0
     assert max(speeds_mm_s(began_s + 1.8, began_s + 2.1)) > 100.0
     assert both.summary()["rendering"]["blind"] == 1
+
+
+@pytest.mark.parametrize(("haptics", "slowest_mm_s", "fastest_mm_s"), [(True, 0.0, 40.0), (False, 200.0, 220.0)])
+def test_the_summary_tells_how_fast_a_constant_finger_hits_the_wall(
+    haptics: bool, slowest_mm_s: float, fastest_mm_s: float
+) -> None:
+    operator = OperatorSettings(haptics=haptics, person=PersonSettings(pull_n=3.0))
+    run = Loopback(LoopbackSettings(RobotSettings(scene="wall"), operator))
+    run.run_until(4.0)
+    first = run.summary()["first_contact"]
+    assert first["with"] == "wall"
+    assert slowest_mm_s < first["speed_mm_s"] < fastest_mm_s
+    assert 2.0 < first["time_s"] < 4.0

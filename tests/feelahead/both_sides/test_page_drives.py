@@ -35,6 +35,7 @@ def run_of(does: Does, device: Any = "browser", link: str = "", *, robot: RobotS
 
 
 def timetable(*rows: tuple[float, dict[str, Any] | None]) -> Does:
+    """Return the page's inputs over time: each row's inputs hold until the row's time."""
     return lambda now_s: next((hands for until_s, hands in rows if now_s < until_s), rows[-1][1])
 
 
@@ -49,6 +50,22 @@ def state(run: Loopback) -> str:
 def speed_m_s(run: Loopback) -> float:
     assert run.operator.screen is not None
     return run.operator.screen.tool_speed_m_s
+
+
+@pytest.mark.parametrize("link", ["", "delay 100ms 5ms distribution normal loss 2%"])
+def test_a_page_arms_advances_and_a_key_up_stops(link: str) -> None:
+    run = run_of(advance_until(4.0, (5.0, {"run": True}), (9.0, {})), link=link)
+    run.run_until(1.99)
+    assert state(run) == "disarmed"
+    run.run_until(2.95)
+    assert state(run) == "armed"
+    assert speed_m_s(run) < 0.002
+    run.run_until(3.99)
+    assert speed_m_s(run) > 0.05
+    delay_s = 0.2 if link else 0.0
+    run.run_until(4.0 + delay_s + 2.0 * GAP_S)
+    assert speed_m_s(run) < 0.005
+    assert state(run) == "armed"
 
 
 @pytest.mark.parametrize("after", [(99.0, None), (99.0, {}), (99.0, WATCH)], ids=["silence", "space up", "let go"])
@@ -140,13 +157,30 @@ def tuned(run: Loopback, at_s: float, probability: float | None, link: str | Non
     run.pages.receive(9, {"tune": {"probability": probability, "link": link}}, at_s)
 
 
+def test_p_and_both_directions_of_the_link_change_while_the_run_goes_on() -> None:
+    run = run_of(advance_until(3.5, (99.0, {})), robot=RobotSettings(permit_tuning=True))
+    tuned(run, 5.0, 0.6, "delay 60ms")
+    before = run.robot.status(5.0).enlargement_mm
+    run.run_until(8.0)
+    after = run.robot.status(8.0).enlargement_mm
+    assert isinstance(before, float)
+    assert isinstance(after, float)
+    notice = run.operator.lease
+    assert notice is not None
+    assert (notice.probability, notice.tuned) == (0.6, 1)
+    summary = run.summary()
+    assert summary["link"]["to_robot"]["asked"] == summary["link"]["to_operator"]["asked"] == "delay 60ms"
+    assert run.operator.link.round_trip.mean is not None
+    assert run.robot.loop_age_s(8.0) > 0.11
+    [granted] = summary["lease"]["tuning"]["granted"]
+    assert granted == {"time_s": pytest.approx(5.06, abs=0.02), "probability": 0.6, "link": "delay 60ms"}
+
+
 def test_a_jump_of_the_delay_stops_the_arm_and_the_page_drives_on_once_it_has_rested() -> None:
     does = advance_until(8.0, (10.0, {}), (11.0, {"run": True}), (12.0, PULL))
     run = run_of(does, robot=RobotSettings(permit_tuning=True))
     tuned(run, 3.5, None, "delay 400ms")
     run.run_until(7.9)
     assert state(run) == "disarmed"
-    asked = run.summary()["link"]
-    assert asked["to_robot"]["asked"] == asked["to_operator"]["asked"] == "delay 400ms"
     run.run_until(12.0)
     assert state(run) == "armed"

@@ -144,6 +144,23 @@ def is_refused(side: SideProcess, key: str) -> None:
     assert [side.wait_for("status", LIMIT_S)["link"] == "up" for _ in range(5)] == [False] * 5
 
 
+def test_a_killed_robot_side_is_an_error_of_the_demo() -> None:
+    with start(*DEMO, "--duration", "60", "--status", "json") as process:
+        assert process.stdout is not None
+        robot_id = None
+        for line in process.stdout:
+            event = json.loads(line)
+            if event["event"] == "started" and event["side"] == "robot":
+                robot_id = event["process_id"]
+            if event.get("link") == "up":
+                break
+        assert robot_id is not None
+        os.kill(robot_id, signal.SIGKILL)
+        _, complaint = process.communicate(timeout=LIMIT_S)
+    assert process.returncode == 1
+    assert "Traceback" not in complaint
+
+
 # Ends at a signal as the interpreter itself does before any of our handlers is installed.
 UNPREPARED = [sys.executable, "-c", "import signal; signal.signal(signal.SIGINT, signal.SIG_DFL); signal.pause()"]
 
@@ -189,6 +206,24 @@ def test_another_processs_signal_is_a_failure() -> None:
 
 NOWHERE = ("--connect=tcp://127.0.0.1:9", "--device=simulated")
 ROBOT = ("--bind=tcp://127.0.0.1:0",)
+# No file of this process gets longer than that, as on a full disk.
+FULL = """
+import os, resource, sys
+resource.setrlimit(resource.RLIMIT_FSIZE, (100, 100))
+os.execv(sys.argv[1], sys.argv[1:])
+"""
+
+
+def test_a_summary_on_a_full_disk_is_one_line_and_the_old_one_stays(tmp_path: Path) -> None:
+    path = tmp_path / "out.json"
+    path.write_text("old")
+    arguments = [*NOWHERE, "--duration=0.2", f"--summary={path}", "--status=none"]
+    code, _, complaint = ended("-c", FULL, sys.executable, "-P", "-m", "operator_side", *arguments)
+    assert code == 2
+    [line] = complaint.splitlines()
+    assert line.startswith(f"feelahead-operator: --summary {path}: cannot be written: File too large; valid: ")
+    assert path.read_text() == "old"
+    assert list(tmp_path.iterdir()) == [path]
 
 
 @pytest.mark.parametrize(

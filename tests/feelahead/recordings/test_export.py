@@ -28,8 +28,10 @@ from feelahead.commands.recordings import export, plot
 from feelahead.recordings.demonstrations import Picture, read_demonstrations, read_pictures
 from feelahead.recordings.lerobot import _of_one_size
 from feelahead.recordings.playback import Seen, seen
+from feelahead.recordings.replay_robot import replay_robot
 from feelahead.recordings.tables import read_tables
 from tests.feelahead.recordings.conftest import record_pictures
+from tests.helpers.recordings.forms import FORMS, rewritten
 
 pyarrow = pytest.importorskip("pyarrow")
 parquet = pytest.importorskip("pyarrow.parquet")
@@ -324,6 +326,26 @@ def test_lerobot_reads_what_its_own_writer_wrote(
     assert ((ages_s >= 0.0) & (ages_s < 0.2)).all()
     assert [*read.meta.video_keys] == ["observation.images.overview"]
     assert len(list((folder / "videos").rglob("*.mp4"))) == 1
+
+
+@pytest.mark.parametrize("form", ["newest first, without chunks", "shuffled", "two channels for each topic"])
+def test_a_recording_that_another_tool_wrote_again_gives_the_same_files(
+    with_pictures: tuple[Recording, list[bytes]], tmp_path: Path, form: str
+) -> None:
+    recording, _ = with_pictures
+    (tmp_path / "other").mkdir()
+    other = tmp_path / "other" / recording.path.name
+    other.write_bytes(rewritten(recording.path, **FORMS[form]))
+    again = open_recording(other)
+
+    def files(run: Recording, kind: str) -> dict[str, bytes]:
+        folder = exported(run, kind, run.path.with_name(kind))
+        return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+    for kind in ("csv", "parquet", "lerobot"):
+        assert files(again, kind) == files(recording, kind)
+    assert list(seen(again)) == list(seen(recording))
+    assert replay_robot(again).lines() == replay_robot(recording).lines()
 
 
 def test_fps_is_for_lerobot_alone(run: Recording) -> None:

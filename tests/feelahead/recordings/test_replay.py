@@ -32,6 +32,7 @@ from feelahead.recordings.tables import read_tables
 from robot_side.compiled.warm_up import kernel_digests
 from robot_side.parts import build_parts
 from tests.feelahead.recordings.conftest import DURATION_S, record_loopback
+from tests.helpers.python_process import ended
 from tests.helpers.recordings.schemas import fitting_topics
 from tests.helpers.refusal import refusal
 
@@ -51,6 +52,30 @@ def test_the_operator_side_sends_and_writes_the_same(run: Recording) -> None:
     assert compared.within
     told = [one for one in recorded_entries(run, "operator", []) if one.kind == Kind.TOLD]
     assert len(told) > 10  # The person felt something, or nothing was compared.
+
+
+ALONE = """
+import sys
+from pathlib import Path
+from common.recording.reading import open_recording
+from feelahead.recordings import replay_operator
+build, loaded = replay_operator.build_operator_side, set()
+def built(*arguments):
+    core = build(*arguments)
+    loaded.update(sys.modules)
+    return core
+replay_operator.build_operator_side = built
+assert replay_operator.replay_operator(open_recording(Path(sys.argv[1]))).within
+assert loaded and "robot_side.core" not in sys.modules
+print(*sorted(sys.modules.keys() - loaded))
+"""
+"""Replay of an operator side, in a process without a robot side; it prints the modules that this loads."""
+
+
+@pytest.mark.processes
+def test_an_operator_side_loads_no_module_while_it_runs(run: Recording) -> None:
+    code, said, complaint = ended("-c", ALONE, str(run.path))
+    assert (code, said.split()) == (0, []), complaint
 
 
 def test_a_run_with_episodes_and_the_scene_put_back_is_made_again(tmp_path: Path) -> None:

@@ -95,7 +95,69 @@ def test_the_plain_enlargement_is_eq_10_for_each_sphere_with_the_trace_and_all_o
         assert found[i] == pytest.approx(expected, rel=1e-12)
 
 
+@settings(derandomize=True, deadline=None, max_examples=40)
+@given(seed=st.integers(0, 2**32 - 1), p=st.floats(0.5, 0.999))
+def test_along_any_one_direction_less_is_needed_than_plainly(seed: int, p: float) -> None:
+    rng = np.random.default_rng(seed)
+    covariances = _covariances(seed)
+    errors = _ERRORS | {"camera_mean_m": tuple(rng.normal(size=3) * 1e-3)}
+    uncertainty = Uncertainty(p, **errors)
+    plain = plain_enlargements_m(uncertainty, covariances, np.zeros((4, 3)), 0.1)
+    direction = rng.normal(size=3)
+    direction /= np.linalg.norm(direction)
+    variance = directional_variance(covariances, np.tile(direction, (4, 1))) + uncertainty.camera_sd_m**2
+    along = uncertainty.mean_along_m(direction) + uncertainty.quantile * np.sqrt(variance)
+    assert (along <= plain + 1e-15).all()
+
+
+def test_a_velocity_or_covariance_that_is_not_finite_is_no_distance() -> None:
+    uncertainty, covariances, still = Uncertainty(), _covariances(3), np.zeros((4, 3))
+    for bad in (math.nan, math.inf):
+        with pytest.raises(ValueError, match="delay_displacement_m"):
+            plain_enlargements_m(uncertainty, covariances, np.full((4, 3), bad), 0.1)
+        with pytest.raises(ValueError, match="variance_m2"):
+            plain_enlargements_m(uncertainty, np.full((4, 3, 3), bad), still, 0.1)
+    for age in (-0.1, math.nan, math.inf):
+        with pytest.raises(ValueError, match="delay_displacement_m"):
+            plain_enlargements_m(uncertainty, covariances, np.ones((4, 3)), age)
+
+
 # The arm's own error (eq. 3-7)
+
+
+_LINKS_M = np.array([0.4, 0.3, 0.2])
+
+
+def _planar_position(angles_rad: FloatArray) -> FloatArray:
+    """Return the positions (..., 3) of the tip of a planar arm with the links `_LINKS_M`, for joint angles (..., 3)."""
+    heading = np.cumsum(angles_rad, axis=-1)
+    x = (_LINKS_M * np.cos(heading)).sum(axis=-1)
+    y = (_LINKS_M * np.sin(heading)).sum(axis=-1)
+    return np.stack([x, y, np.zeros_like(x)], axis=-1)
+
+
+def _planar_jacobian(angles_rad: FloatArray) -> FloatArray:
+    heading = np.cumsum(angles_rad)
+    columns = [
+        [
+            -(_LINKS_M * np.sin(heading))[joint:].sum(),
+            (_LINKS_M * np.cos(heading))[joint:].sum(),
+            0.0,
+        ]
+        for joint in range(3)
+    ]
+    return np.array(columns).T
+
+
+def test_covariance_is_what_noisy_encoders_do_to_a_planar_arm() -> None:
+    angles = np.array([0.3, -0.7, 1.1])
+    sigma = np.array([1e-3, 5e-4, 2e-3])
+    covariance = position_covariance(_planar_jacobian(angles)[None], sigma)[0]
+    rng = np.random.default_rng(1)
+    tips = _planar_position(angles + rng.normal(size=(200_000, 3)) * sigma)
+    sampled = np.cov(tips.T)
+    # 200 000 samples: a variance is known to 0.32 % (one standard deviation).
+    np.testing.assert_allclose(sampled, covariance, atol=0.015 * covariance.max())
 
 
 @settings(derandomize=True, deadline=None, max_examples=60)

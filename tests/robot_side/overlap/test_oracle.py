@@ -254,6 +254,17 @@ def test_depths_below_rounding_still_give_something(solid: Solid, feature: str) 
             assert ((found > 0.0) == hit).all()
 
 
+@both
+@features
+def test_volumes_grow_with_the_radius_across_every_form(solid: Solid, feature: str) -> None:
+    one = touching(solid, feature, 0.0)(np.random.default_rng(5), 1, False)
+    growing = one.radii * (1.0 + np.concatenate([[0.0], np.geomspace(1e-15, 1.0, 2000)]))
+    many = one[np.zeros(len(growing), dtype=np.int64)]
+    volumes, _, areas = precise_overlaps(Pairs(solid, many.centers, growing, many.parameters))
+    assert (np.diff(volumes) >= -1e-12 * volumes[1:]).all()
+    assert (volumes[:-1] + np.diff(growing) * areas[:-1] <= volumes[1:] * 10.0 + 1e-300).all()
+
+
 def test_only_the_rows_named_are_written_by_the_precise_forms() -> None:
     _, pairs = frozen_class("box", "edge depth 1e-3", 8)
     results = np.full(8, -1.0), np.full((8, 3), -1.0), np.full(8, -1.0)

@@ -8,12 +8,15 @@ from common.errors import FeelaheadError
 from robot_side.drivers.mujoco.arm import LONGEST_TURN_S, MujocoArm
 from robot_side.drivers.mujoco.drives.joint_drives import JointDrives
 from robot_side.drivers.mujoco.encoders import Encoder
+from robot_side.drivers.mujoco.ground_truth import GroundTruth
 from robot_side.drivers.mujoco.joint_reference import MotionLimits
 from robot_side.drivers.mujoco.scene import Scene, load_scene
 from tests.helpers.arm_models import (
     COUPLING,
     MOTORS,
     POSITION_SERVOS,
+    SEVERAL,
+    VELOCITY_SERVOS,
     planar_arm,
 )
 from tests.helpers.tool_driver import PERIOD_S, VALID_S, ToolDriver
@@ -21,6 +24,19 @@ from tests.helpers.tool_driver import PERIOD_S, VALID_S, ToolDriver
 
 def perfect_arm(scene: Scene, limits: MotionLimits | None = None) -> MujocoArm:
     return MujocoArm(scene, Encoder(0.0, 0.0), limits)
+
+
+@pytest.mark.parametrize(
+    "velocity_m_s", [(0.2, 0.0, 0.0), (0.0, 0.2, 0.0), (0.0, 0.0, 0.15), (-0.1, -0.1, 0.05), (0.02, 0.0, 0.0)]
+)
+def test_the_tool_moves_as_commanded(velocity_m_s: tuple[float, float, float]) -> None:
+    driver = ToolDriver.load()
+    wanted = np.array(velocity_m_s)
+    path = driver.move(np.concatenate([wanted, np.zeros(3)]), 0.8)
+    steady = path[round(0.3 / PERIOD_S) :]
+    velocity = (steady[-1] - steady[0]) / (PERIOD_S * (len(steady) - 1))
+    # 1 % of the speed along and across, over half a second.
+    assert np.linalg.norm(velocity - wanted) < 0.01 * np.linalg.norm(wanted)
 
 
 def test_an_arm_that_nobody_ticks_stops_by_itself() -> None:
@@ -37,6 +53,20 @@ def test_an_arm_that_nobody_ticks_stops_by_itself() -> None:
     assert speed * VALID_S * 0.95 < np.linalg.norm(stopped - last) < speed * VALID_S + 0.02
     driver.wait(1.0)
     assert np.linalg.norm(driver.tool_m() - stopped) < 1e-5
+
+
+def test_ticking_does_not_change_the_physics() -> None:
+    paths = []
+    for ticks in (1, 500):
+        scene = load_scene()
+        arm = perfect_arm(scene)
+        arm.state(7.0)
+        arm.command(np.array([0.4, -0.2, 0.1, 0.0, 0.3, 0.0]), 7.3)
+        for tick in range(1, ticks + 1):
+            state = arm.state(7.0 + 0.5 * tick / ticks)
+        paths.append(state.joint_positions_rad)
+        assert state.time_s == pytest.approx(7.5)
+    np.testing.assert_array_equal(paths[0], paths[1])
 
 
 def test_the_same_instant_is_measured_once_and_the_past_not_at_all() -> None:
@@ -119,6 +149,48 @@ def test_mujocos_own_last_words_are_one_line(monkeypatch: pytest.MonkeyPatch) ->
         arm.state(0.01)
 
 
+def test_a_blocked_arm_winds_nothing_up(tmp_path: Path) -> None:
+    block = '<geom name="block" type="box" pos="0.5 0 -0.15" size="0.15 0.3 0.1"/>'
+    key = '<keyframe><key qpos="0.2 -0.2 0 0"/></keyframe>'
+    stiff = POSITION_SERVOS.replace('kp="1000" kv="50"', 'kp="8000" kv="400"')
+    path = planar_arm(tmp_path, arm_actuators=stiff, world=block, extra_bottom=COUPLING + key)
+    scene = load_scene(path, "tcp")
+    arm = perfect_arm(scene)
+    arm.state(0.0)
+    for tick in range(1, 1000):
+        arm.command(np.array([0.5, 0.0]), tick * 2e-3 + 0.05)
+        state = arm.state(tick * 2e-3)
+    assert "block" in {name for _, name in GroundTruth(scene).observe().contacts}
+    blocked = state.joint_positions_rad
+    pressing = abs(float(scene.data.actuator_force[0]))
+    # Halted, it stops pressing and stays where it is.
+    released = arm.state(3.0)
+    assert np.abs(released.joint_velocities_rad_s).max() < 1e-3
+    assert np.abs(released.joint_positions_rad - blocked).max() < 0.02
+    assert abs(float(scene.data.actuator_force[0])) < pressing - 10.0
+    # Commanded back it moves at once: 1.5 s of pressing at 0.5 rad/s left no 0.75 rad to be unwound.
+    arm.command(np.array([-0.5, 0.0]), 4.0)
+    assert arm.state(3.2).joint_positions_rad[0] < blocked[0] - 0.06
+
+
+@pytest.mark.parametrize("actuators", [POSITION_SERVOS, VELOCITY_SERVOS, MOTORS, *SEVERAL])
+def test_every_kind_of_actuator_holds_moves_and_stops_an_arm(tmp_path: Path, actuators: str) -> None:
+    scene = load_scene(planar_arm(tmp_path, arm_actuators=actuators), "tcp")
+    arm = perfect_arm(scene)
+    start = arm.state(0.0).joint_positions_rad
+    # Gravity pulls on an arm without gravity compensation.
+    np.testing.assert_allclose(arm.state(1.0).joint_positions_rad, start, atol=2e-3)
+    velocity = np.array([0.4, -0.3])
+    positions = []
+    for tick in range(500):
+        arm.command(velocity, 1.0 + tick * 2e-3 + 0.05)
+        positions.append(arm.state(1.0 + tick * 2e-3).joint_positions_rad)
+    np.testing.assert_allclose((positions[-1] - positions[200]) / (299 * 2e-3), velocity, rtol=0.02)
+    stopped = arm.state(2.5)
+    assert np.abs(stopped.joint_velocities_rad_s).max() < 1e-3
+    assert np.abs(stopped.joint_positions_rad - positions[-1]).max() < 0.4 * 0.05 + 0.4**2 / 12.0 + 5e-3
+
+
 def test_motors_overcome_dry_friction(tmp_path: Path) -> None:
     model = planar_arm(tmp_path, arm_actuators=MOTORS)
     model.write_text(model.read_text().replace('armature="0.1"', 'armature="0.001" frictionloss="40"'))
@@ -169,6 +241,25 @@ def test_of_mujocos_warnings_three_say_that_it_is_unstable(kind: str) -> None:
             arm.state(0.01)
     else:
         arm.state(0.01)
+
+
+def test_it_grasps_and_lifts_the_target() -> None:
+    driver = ToolDriver.load()
+    target = driver.scene.data.body("table_scene/target")
+    assert driver.arm.state(driver.now_s).gripper_opening_m == pytest.approx(0.085, abs=1e-3)
+    driver.go_to(np.array([0.6, 0.0, 0.07]), 1.5)
+    driver.go_to(np.array([0.785, 0.0, 0.07]), 2.0)
+    assert driver.contacts == set()
+    state = driver.grip(1.0, 0.8)
+    assert state.gripper_holding
+    assert state.gripper_opening_m == pytest.approx(0.04, abs=1e-3)
+    driver.go_to(np.array([0.7, 0.0, 0.2]), 3.0)
+    assert target.xpos[2] > 0.18
+    assert {name for _, name in driver.contacts} == {"target"}
+    assert driver.wait(2.0).gripper_holding
+    assert target.xpos[2] > 0.18
+    assert not driver.grip(-1.0, 0.8).gripper_holding
+    assert target.xpos[2] < 0.1
 
 
 def test_weak_servos_and_other_drives_may_lead_farther() -> None:

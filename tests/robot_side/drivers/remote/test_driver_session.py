@@ -3,10 +3,14 @@
 import math
 from typing import Any
 
+import msgpack
 import numpy as np
 import pytest
 
-from tests.robot_side.drivers.remote.driver_desk import AHEAD_S, DriverDesk
+from robot_side.arm.ability import JointLimits
+from robot_side.arm.following import Following
+from robot_side.arm.joint_estimate import lateness_s
+from tests.robot_side.drivers.remote.driver_desk import AHEAD_S, SHAPE, TICK_S, DriverDesk
 
 
 @pytest.mark.parametrize("delay_s", [0.0, 0.02])
@@ -184,3 +188,48 @@ def test_a_command_that_is_none_is_refused_whole() -> None:
             desk.arm.command(velocities, 1.0)
     with pytest.raises(ValueError, match="-1 to 1"):
         desk.arm.command_gripper(1.5, 1.0)
+
+
+class Careless(DriverDesk):
+    """Driver that loses all commands but each `keeps`-th, and may move by each command for 4 ms only."""
+
+    keeps, briefly = 1, False
+
+    def send(self, peer: bytes, payload: bytes) -> bool:
+        sequence = msgpack.unpackb(payload).get("sequence", 0)
+        return self.keeps > 0 and sequence % self.keeps == 0 and super().send(peer, payload)
+
+    def drive(self) -> None:
+        if self.briefly and self.newest is not None and self.drivers_s - self._read_s >= 0.004:
+            self.newest = self.newest | {"valid_until_s": 0.0}
+        super().drive()
+
+
+@pytest.mark.parametrize(
+    ("keeps", "briefly", "says"),
+    [
+        (1, False, None),
+        # Every second command is enough for who obeys each until it expires.
+        (2, False, None),
+        (0, False, "joint 1 (shoulder) and 1 more do not move"),
+        (2, True, "joint 1 (shoulder) and 1 more move too slowly"),
+    ],
+)
+@pytest.mark.parametrize(("delay_s", "period_s"), [(0.0, 0.005), (0.02, 0.033)])
+def test_a_driver_that_loses_commands_is_noticed(
+    keeps: int, briefly: bool, says: str | None, delay_s: float, period_s: float
+) -> None:
+    desk = Careless(delay_s, period_s=period_s)
+    desk.run(0.5)
+    desk.keeps, desk.briefly = (keeps or 10**9), briefly
+    following = Following(JointLimits(np.full(2, 2.0), np.full(2, 8.0)), SHAPE.joint_names)
+    said = set()
+    for tick in range(1300):
+        velocity = 0.4 if tick > 100 else 0.0
+        desk.run(TICK_S, velocity)
+        state = desk.arm.state(desk.now_s)
+        following.update(np.full(2, velocity), state, lateness_s(state, desk.now_s), lambda: False)
+        if tick <= 600:
+            said.add(following.text)
+    assert (says in said) if says else said == {None}
+    assert (following.stop is not None) is (says is not None and "not move" in says)

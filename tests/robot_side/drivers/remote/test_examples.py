@@ -20,6 +20,7 @@ from robot_side.drivers.remote.arm import RemoteArm
 from robot_side.drivers.remote.driver_session import ArmShape
 from robot_side.drivers.remote.frame_message import FRAME_DECODER, FRAME_VERSION, require_possible
 from robot_side.drivers.remote.messages import decoded
+from robot_side.drivers.remote.objects import RemoteObjects
 from tests.helpers.machines.waiting import LIMIT_S
 from tests.helpers.python_process import start
 from tests.helpers.repository import ROOT
@@ -97,6 +98,17 @@ def stands_since(since_s: float, arm: RemoteArm, port: DriverPort) -> bool:
 
 
 @pytest.mark.processes
+def test_the_example_of_perception_is_perceived(port: DriverPort) -> None:
+    notes: list[str] = []
+    objects = RemoteObjects(port, {}, 0.003, notes.append)
+    with running("example_objects.py", port.endpoint):
+        assert any(objects.exchange(port.wait(TURN_S)) for _ in range(ROUNDS))
+        frame = objects.perceive(port.wait(0.0))
+    assert frame.names == ("table", "target", "ball")
+    assert notes == []
+
+
+@pytest.mark.processes
 @pytest.mark.skipif(shutil.which("g++") is None, reason="there is no g++")
 def test_the_example_in_cpp_packs_what_the_robot_side_reads(tmp_path: Path) -> None:
     # libzmq's header may be missing: a stand-in writes the first message to a file.
@@ -170,3 +182,23 @@ def test_an_arm_of_lerobot_integrates_holds_and_stops_by_itself() -> None:
     assert state["joint_positions"] == pytest.approx([math.radians(10.0) + 0.05, math.radians(20.0) + 0.1], abs=0.005)
     assert follower.at["elbow_flex.pos"] == pytest.approx(-20.0 - math.degrees(0.1), abs=0.3)
     assert state["joint_velocities"] == pytest.approx([0.0, 0.0], abs=1e-3)
+
+
+def test_an_arm_of_lerobot_holds_what_its_gripper_cannot_close_on_and_is_not_pushed_far() -> None:
+    follower = FakeFollower()
+    follower.blocked_at = 40.0
+    arm = lerobot_arm().VelocityArm(follower, ["shoulder_pan", "elbow_flex"], "gripper", 0.08, None)
+    state = lerobot_turns(arm, 0.0, 2)
+    assert (state["opening_m"], state["holding"]) == (pytest.approx(0.08), False)
+    state = lerobot_turns(arm, 0.04, 60, {"joint_velocities": [0.0, 0.0], "closing": 1.0, "valid_until_s": 1.0})
+    assert (state["opening_m"], state["holding"]) == (pytest.approx(0.032), True)
+    held = follower.at["shoulder_pan.pos"]
+    follower.send_action = lambda action: action  # type: ignore[method-assign]  # something holds the arm up
+    lerobot_turns(arm, 2.0, 200, {"joint_velocities": [0.5, 0.0], "closing": 0.0, "valid_until_s": 100.0})
+    assert math.radians(math.degrees(arm._goals[0]) - held) == pytest.approx(0.1)
+    # A bus that hung for a second moves the goals by no more than a tenth of a second's motion.
+    follower = FakeFollower()
+    arm = lerobot_arm().VelocityArm(follower, ["shoulder_pan", "elbow_flex"], "gripper", 0.08, None)
+    lerobot_turns(arm, 0.0, 2)
+    lerobot_turns(arm, 5.0, 1, {"joint_velocities": [0.5, 0.0], "closing": 0.0, "valid_until_s": 6.0})
+    assert follower.at["shoulder_pan.pos"] == pytest.approx(10.0 + math.degrees(0.05))
