@@ -4,15 +4,15 @@ The file is read record by record, because its index is at the end, which a file
 """
 
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, BinaryIO, Final, NamedTuple
 
 from common.errors import ConfigurationError
+from common.recording.mcap_chunk import COMPRESSIONS, records_of
 
 _MAGIC: Final = b"\x89MCAP0\r\n"
-_COMPRESSIONS: Final = ("", "zstd", "lz4")
 _PART_BYTES: Final = 1 << 20
 """Length from which a part outside of chunks ends"""
 
@@ -75,7 +75,7 @@ class Scan:
             if self._unchecked and record.data_section_crc not in (0, _checksum(file, begin)):
                 self._refuse("is damaged: its checksum is another one, which does not say where", "an undamaged file")
         chunk = isinstance(record, Chunk)
-        if chunk and record.compression not in _COMPRESSIONS:
+        if chunk and record.compression not in COMPRESSIONS:
             self._refuse(f"is compressed by {record.compression!r}", "zstd, lz4 or none")
         stamps = []
         for one in _inside(record):
@@ -125,11 +125,10 @@ def _records(file: BinaryIO, limit: int | None) -> Iterator[tuple[int, int, Any]
         begin = end
 
 
-def _inside(record: Any) -> list[Any]:
+def _inside(record: Any) -> Iterable[Any]:
     from mcap.records import Chunk  # noqa: PLC0415
-    from mcap.stream_reader import breakup_chunk  # noqa: PLC0415
 
-    return breakup_chunk(record, validate_crc=True) if isinstance(record, Chunk) else [record]
+    return records_of(record) if isinstance(record, Chunk) else [record]
 
 
 def _checksum(file: BinaryIO, end: int) -> int:

@@ -2,17 +2,22 @@
 
 import io
 import struct
+import zlib
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, Final
 
+import lz4.frame  # type: ignore[import-untyped]
 import numpy as np
+import zstandard
+from mcap.opcode import Opcode
 from mcap.records import Channel, Message, Metadata, Schema
 from mcap.stream_reader import StreamReader
 from mcap.writer import CompressionType, IndexType, Writer
 
 _MAGIC: Final = 8
 _FOOTER: Final = 9 + 20
+_DESCRIBING: Final = (Opcode.SCHEMA, Opcode.CHANNEL)
 BARE: Final[Mapping[str, Any]] = {
     **{"index_types": IndexType.NONE, "repeat_channels": False, "repeat_schemas": False},
     **{"use_statistics": False, "use_summary_offsets": False},
@@ -78,6 +83,41 @@ def _with_private_record(content: bytes) -> bytes:
     return content[:place] + b"\x80" + struct.pack("<Q", 5) + b"other" + content[place:]
 
 
+def _further_fields(records: bytes) -> tuple[str, bytes, bytes]:
+    padded, place = bytearray(), 0
+    while place < len(records):
+        opcode, length = struct.unpack_from("<BQ", records, place)
+        body = records[place + 9 : place + 9 + length] + (b"further" if opcode in _DESCRIBING else b"")
+        padded += struct.pack("<BQ", opcode, len(body)) + body
+        place += 9 + length
+    return "", bytes(padded), bytes(padded)
+
+
+def _two_frames(name: str, compress: Callable[[bytes], bytes]) -> Callable[[bytes], tuple[str, bytes, bytes]]:
+    return lambda records: (name, records, compress(records[:100]) + compress(records[100:]))
+
+
+def _with_chunks(change: Callable[[bytes], tuple[str, bytes, bytes]]) -> Callable[[bytes], bytes]:
+    """Return what changes a file's uncompressed chunks: their records to a compression, records, and packed records."""
+
+    def changed(content: bytes) -> bytes:
+        output, place = bytearray(content[:_MAGIC]), _MAGIC
+        while place < len(content) - _MAGIC:
+            opcode, length = struct.unpack_from("<BQ", content, place)
+            body, place = content[place + 9 : place + 9 + length], place + 9 + length
+            if opcode == Opcode.CHUNK:
+                name, records, packed = change(body[40:])
+                sizes = struct.pack("<QII", len(records), zlib.crc32(records), len(name))
+                body = body[:16] + sizes + name.encode() + struct.pack("<Q", len(packed)) + packed
+            output += struct.pack("<BQ", opcode, len(body)) + body
+        return bytes(output) + content[-_MAGIC:]
+
+    return changed
+
+
+_CHUNKS: Final[Mapping[str, Any]] = {"compression": CompressionType.NONE, "chunk_size": 3000, **BARE} | {
+    "repeat_channels": True
+}
 FORMS: Final[Mapping[str, Mapping[str, Any]]] = {
     "zstd": {},
     "lz4": {"compression": CompressionType.LZ4},
@@ -97,6 +137,9 @@ FORMS: Final[Mapping[str, Mapping[str, Any]]] = {
     "metadata at the end": {"metadata_last": True, "use_chunking": False},
     "a record of a private kind": {"finish": _with_private_record},
     "without a footer": {**BARE, "finish": lambda content: content[: -_MAGIC - _FOOTER]},
+    "further fields in chunks": {**_CHUNKS, "finish": _with_chunks(_further_fields)},
+    "two frames of zstd": {**_CHUNKS, "finish": _with_chunks(_two_frames("zstd", zstandard.compress))},
+    "two frames of lz4": {**_CHUNKS, "finish": _with_chunks(_two_frames("lz4", lz4.frame.compress))},
     "another end": {"finish": lambda content: content[:-_MAGIC] + bytes(_MAGIC)},
 }
 """Arguments of `rewritten`, by a name of the form"""
