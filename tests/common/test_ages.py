@@ -11,9 +11,6 @@ from common.timing.ages import LoopAge, QueueingAge
 delays = st.lists(st.floats(0.0, 1.0), min_size=1, max_size=100)
 
 
-# Loop age (eq. 8)
-
-
 @given(st.floats(0.0, 1.0), st.floats(0.0, 1.0))
 def test_a_silence_counts_but_for_what_the_deadbands_allow(silent_s: float, longer_s: float) -> None:
     counted = counted_s(silent_s)
@@ -63,9 +60,6 @@ def test_loop_age_never_lies_below_the_quantile_or_rises_by_waiting(ages_s: list
         values_s = [loop_age.value(now_s + later_s) for later_s in (0.0, 0.1, 1.0, 60.0)]
         assert values_s == sorted(values_s, reverse=True)
         assert values_s[-1] == pytest.approx(median_s, abs=1e-12)
-
-
-# Queueing age
 
 
 @given(delays, st.floats(-1e5, 1e5))

@@ -1,5 +1,3 @@
-"""Map of onset distances at places that sticks may reach: refused values, rounding downwards, comparison."""
-
 import numpy as np
 import pytest
 from hypothesis import given

@@ -1,6 +1,4 @@
 import math
-import subprocess
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -25,16 +23,6 @@ def test_a_virtual_clock_never_runs_backwards(past_s: float) -> None:
     clock.advance_to(2.0)
     with pytest.raises(ValueError, match="now_s"):
         clock.advance_to(1.5)
-
-
-@pytest.mark.processes
-@pytest.mark.skipif(not Path("/proc/self/ns/time").is_symlink(), reason="the kernel has no time namespaces")
-def test_processes_on_one_machine_share_a_domain() -> None:
-    mine = clock_domain()
-    assert mine
-    script = "from common.clock import clock_domain; print(clock_domain())"
-    other = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
-    assert other.stdout.strip() == mine
 
 
 @pytest.mark.usefixtures("fresh_domain")

@@ -1,5 +1,3 @@
-"""Ranges that are declared only in a field's type hint: values outside are refused."""
-
 import dataclasses
 import importlib
 import inspect
@@ -70,8 +68,6 @@ def test_the_same_numbers_are_refused_here_and_by_the_decoder(value: float) -> N
             checked = False
         assert checked == decoded
 
-
-# Values just outside a record's declared range are refused by that record, and named
 
 MODULES = (
     *("common.emulation.clauses", "common.emulation.loss", "common.emulation.profile"),

@@ -277,9 +277,6 @@ def test_garbage_and_well_packed_nonsense_raise_the_documented_error(payload: by
         decode(payload)
 
 
-# Versions and sizes
-
-
 @pytest.mark.parametrize("version", [PROTOCOL_VERSION + 1, -1, True, "2", None, 2.0, [2]])
 def test_another_version_is_told_apart_from_garbage(version: Any) -> None:
     content = msgpack.unpackb(encode(VALID[1]))
@@ -299,9 +296,6 @@ def test_what_is_too_long_is_not_looked_into() -> None:
             read(bytes(limit + 1))
     with pytest.raises(RemoteProtocolError):
         decode(encode(VALID[0]) + bytes(MAXIMUM_BYTES))
-
-
-# Refusals
 
 
 REFUSED: tuple[tuple[Any, dict[str, Any], str], ...] = (
@@ -375,9 +369,6 @@ def test_what_lies_outside_a_declared_range_is_refused_when_made_and_when_read(
     if not (isinstance(value, int) and value > 2**63 - 1):  # more than MessagePack has bytes for
         with pytest.raises(RemoteProtocolError):
             read(msgpack.packb([PROTOCOL_VERSION, content]))
-
-
-# Prepared messages and uniform fields
 
 
 @pytest.mark.parametrize("message", VIEWS)

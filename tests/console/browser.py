@@ -85,11 +85,9 @@ class Page:
         raw.on("pageerror", lambda error: self.complaints.append(str(error)))
 
     def text(self, selector: str) -> str:
-        """Return the text of an element."""
         return str(self.raw.text_content(selector) or "").strip()
 
     def ask(self, script: str, argument: object = None) -> Any:
-        """Evaluate a piece of JavaScript in the page, and return its value."""
         return self.raw.evaluate(script, argument)
 
     def wait(self, script: str, what: str, limit_s: float = LIMIT_S) -> None:
@@ -102,16 +100,13 @@ class Page:
             raise
 
     def wait_for_text(self, selector: str, words: str, limit_s: float = LIMIT_S) -> None:
-        """Wait until an element contains `words`, in upper or lower case."""
         script = f"document.querySelector({selector!r})?.textContent.toLowerCase().includes({words.lower()!r})"
         self.wait(script, f"{words!r} in {selector}", limit_s)
 
     def pixels(self, selector: str | None = None) -> np.ndarray[Any, np.dtype[np.uint8]]:
-        """Return the pixels (height, width, 3) of an element, or of the whole page."""
         return np.asarray(Image.open(io.BytesIO(self.shot(selector))).convert("RGB"))
 
     def picture(self, name: str) -> None:
-        """Write a picture of the page to a file, for people to look at."""
         (self._out / f"{name}.png").write_bytes(self.shot())
 
     def shot(self, selector: str | None = None) -> bytes:
@@ -127,12 +122,10 @@ class Page:
         return base64.b64decode(answer["data"])
 
     def press(self, key: str) -> None:
-        """Press and release a key."""
         self.raw.keyboard.press(key)
 
     @contextmanager
     def held(self, *keys: str) -> Iterator[None]:
-        """Hold these keys down during the context."""
         for key in keys:
             self.raw.keyboard.down(key)
         try:
@@ -142,11 +135,9 @@ class Page:
                 self.raw.keyboard.up(key)
 
     def blur(self) -> None:
-        """Take the focus from the window, as when a person goes to another window."""
         self.ask("window.dispatchEvent(new Event('blur'))")
 
     def hide(self) -> None:
-        """Hide the tab, as when a person goes to another tab."""
         self.ask(
             """() => {
             Object.defineProperty(document, 'visibilityState', { value: 'hidden', configurable: true });

@@ -19,7 +19,6 @@ _OUT = Path("console-pictures")
 
 @pytest.fixture(scope="session", name="browser")
 def chromium() -> Iterator[Browser]:
-    """Chromium, which writes pictures to the folder console-pictures/."""
     with browser(_OUT.absolute()) as opened:
         yield opened
 
@@ -39,7 +38,6 @@ def demos() -> Iterator[Callable[[tuple[str, ...]], Run]]:
 
 @pytest.fixture
 def demo(demos: Callable[[tuple[str, ...]], Run], link: tuple[str, ...]) -> Run:
-    """Demo that runs through all tests with this link."""
     return demos(link)
 
 

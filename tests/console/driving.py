@@ -106,7 +106,6 @@ class Hand:
         self._held.add("run")
 
     def release(self) -> None:
-        """Let all keys but Space come up."""
         for key in self._held - {"run"}:
             self._page.raw.keyboard.up(key)
         self._held &= {"run"}
@@ -201,7 +200,6 @@ def approach(hand: Hand) -> None:
 
 
 def grasp(hand: Hand) -> bool:
-    """Close the fingers; return whether the page says that they hold something."""
     hand.hold("KeyC")
     hand.wait(4.0, _holds)
     return _holds(hand.settle())

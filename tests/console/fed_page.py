@@ -43,7 +43,6 @@ class Fed:
     ends: threading.Event = field(default_factory=threading.Event)
 
     def feed(self) -> None:
-        """Feed 20 times a second until the end."""
         clock, pictures, step, driver = MonotonicClock(), Pictures(), 0, ""
         with Console("test") as console:
             while not self.ends.wait(0.05):

@@ -95,7 +95,6 @@ class HandsAlone:
         self.let_pass(0.1)
 
     def let_pass(self, for_s: float) -> None:
-        """Advance virtual time, here and in the page, in frames of 20 ms."""
         for _ in range(round(1000 * for_s / _FRAME_MS)):
             self.now_ms += _FRAME_MS
             self.page.raw.clock.run_for(_FRAME_MS)
@@ -158,18 +157,15 @@ class HandsAlone:
         self.expect("You drive")
 
     def expect(self, words: str) -> None:
-        """Assert that these words are in the page's line about who drives."""
         if words not in (said := self.page.text("#hands_state")):
             raise AssertionError(f"the page says {said!r}, not {words!r}; {self.pages.doing}, {self.state}")
 
     @property
     def pulled(self) -> tuple[float, float]:
-        """Travels of L2 (retreat) and R2 (advance) in the newest intent."""
         return (0.0, 0.0) if self.intent is None else (self.intent.l2, self.intent.r2)
 
     @property
     def runs(self) -> bool:
-        """Whether hold-to-run is held, by the newest intent."""
         return self.intent is not None and self.intent.run
 
 

@@ -20,8 +20,6 @@ _KEPT: Final = 400
 
 
 class Run:
-    """Running demo, and the newest facts that it printed."""
-
     def __init__(self, demo: StartedSide) -> None:
         self._demo = demo
         self.address = ""
@@ -33,7 +31,6 @@ class Run:
         self.notes: list[str] = []
 
     def look(self) -> None:
-        """Read the demo's new events."""
         for event in self._demo.events():
             kind = event["event"]
             if kind == "console":
@@ -59,12 +56,10 @@ class Run:
 
     @property
     def status(self) -> Event:
-        """Status of the operator side in the newest facts."""
         return dict(self.facts[-1]["status"]) if self.facts else {}
 
     @contextmanager
     def frozen(self, side: str) -> Iterator[None]:
-        """Stop a side's process with kill -STOP, and continue it at the end."""
         os.kill(self.process_ids[side], signal.SIGSTOP)
         try:
             yield

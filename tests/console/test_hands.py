@@ -24,14 +24,6 @@ def test_space_drives(browser: Browser, demo: Run) -> None:
         demo.wait_until("disarmed or at rest", lambda run: not _runs(run))
 
 
-def test_a_key_marks_an_episode(browser: Browser, demo: Run) -> None:
-    """N starts an episode, though a scripted person drives; the page stays connected."""
-    with browser.page(demo.address) as page:
-        page.wait("document.querySelector('#drive:enabled') !== null", "a page with facts")
-        page.press("KeyN")
-        demo.wait_until("marked", lambda run: "operator: episode: start" in run.notes)
-
-
 def test_escape_stops(browser: Browser, fresh_demo: Run) -> None:
     """Esc stops whoever drives: here the scripted person, while another element of the page has the focus."""
     with browser.page(fresh_demo.address) as page:
@@ -58,12 +50,10 @@ def _newest(run: Run) -> dict[str, Any]:
 
 
 def is_armed(run: Run) -> bool:
-    """Return whether the arm is armed, by the newest facts."""
     return run.status.get("state") == "armed"
 
 
 def pull(run: Run) -> float:
-    """Return R2's travel, by the newest facts."""
     return float(_newest(run)["r2"]["travel"] or 0.0)
 
 

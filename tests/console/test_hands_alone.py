@@ -280,24 +280,6 @@ def test_what_cannot_be_done_is_said(browser: Browser) -> None:
         assert given[-1] is False
 
 
-def test_a_lost_link_is_why_nothing_can_be_tuned(browser: Browser) -> None:
-    """While nothing is heard, the page does not say that the run permits no tuning, which is then unknown."""
-    with hands_alone(browser) as alone:
-        alone.facts = {"may_tune": False, "status": {"state": "disarmed", "link": "lost", "owner": "ready"}}
-        alone.let_pass(0.06)
-        assert alone.page.text("#tuning_reason") == "The robot is not heard: nothing can be tuned."
-
-
-def test_a_page_that_was_ready_says_that_the_link_is_lost(browser: Browser) -> None:
-    """A ready page asks nobody to hold Space once the robot side is gone."""
-    with hands_alone(browser) as alone:
-        alone.drive()
-        lost = {"state": "disarmed", "link": "lost", "owner": "ready", "person": alone.shared.doing}
-        alone.facts = {"status": lost}
-        alone.let_pass(0.06)
-        assert alone.page.text("#hands_state") == "The robot is not heard: nothing can be driven."
-
-
 def test_sliders_tune(browser: Browser) -> None:
     """Keys move the sliders. The wish is sent once they rest, and the page shows the present value beside it."""
     with hands_alone(browser) as alone:

@@ -92,7 +92,6 @@ def test_keyboard_reaches_everything(browser: Browser, demo: Run) -> None:
 
 
 def _inside(page: Page, selector: str, size: tuple[int, int]) -> tuple[float, float]:
-    """Return an element's width and height; AssertionError unless it is within the page."""
     box = page.raw.locator(selector).bounding_box() or dict.fromkeys(("x", "y", "width", "height"), 0.0)
     x, y, width, height = box["x"], box["y"], box["width"], box["height"]
     assert width > 0

@@ -110,6 +110,5 @@ def _wait_for_daemon(daemon: subprocess.Popen[bytes], environment: Mapping[str, 
 
 
 def _tidy(*words: str, environment: Mapping[str, str]) -> bool:
-    """Run a command that may fail; return whether it succeeded."""
     asked = subprocess.run(words, env=os.environ | dict(environment), capture_output=True, check=False)
     return asked.returncode == 0

@@ -76,18 +76,6 @@ def test_killed_the_arm_stops_and_comes_back_disarmed(running: Engine, service: 
     disturbed_and_back(running, Watched(running, service).kill)
 
 
-def test_the_router_taken_out_of_a_network_and_put_back(running: Engine) -> None:
-    """After its return the router has another address and another network interface."""
-    network, router = f"{running.project}_operator", running.container("router")
-
-    def take() -> None:
-        running.docker("network", "disconnect", "--force", network, router)
-        time.sleep(1.0)
-        running.docker("network", "connect", "--alias", "robot", network, router)
-
-    disturbed_and_back(running, take)
-
-
 def test_the_robot_side_killed(running: Engine) -> None:
     """The triggers are released. The robot side comes back disarmed, and follows no command from before."""
     robot, operator = Watched(running, "robot"), Watched(running, "operator")
@@ -140,7 +128,6 @@ def disturbed_and_back(engine: Engine, disturb: Callable[[], None]) -> None:
 
 
 def armed(robot: Watched) -> None:
-    """Wait for a new status in which the arm is armed."""
     robot.new_events()
     robot.wait_for("armed", state_is("armed"), 120.0)
 

@@ -28,8 +28,6 @@ class Compose:
 
 
 class Watched:
-    """Container of one service, with all events since the container began."""
-
     def __init__(self, engine: Engine, service: str) -> None:
         self._engine = engine
         self.service = service
@@ -38,7 +36,6 @@ class Watched:
         self._waiting: list[Event] = []
 
     def new_events(self) -> list[Event]:
-        """Return the events that `--status json` printed since the last call."""
         lines = [line for line in self._engine.docker("logs", self.container).splitlines() if line.startswith("{")]
         new, self._seen = lines[self._seen :], len(lines)
         said, self._waiting = [*self._waiting, *map(json.loads, new)], []
@@ -71,5 +68,4 @@ def state_is(*states: str) -> Callable[[Event], bool]:
 
 
 def link_up(event: Event) -> bool:
-    """Return whether an event is a status with the link up."""
     return event.get("event") == "status" and event.get("link") == "up"

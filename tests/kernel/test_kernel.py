@@ -16,7 +16,7 @@ from tests.kernel.ramdisk import WRITABLE, make_ramdisk, module_order
 pytestmark = [pytest.mark.kernel, pytest.mark.processes]
 
 _INSIDE = Path(__file__).parent / "inside"
-_FILES = ("operator_side.py", "command.py", "layouts.py", "gamepad.py", "driver.py", "device.py")
+_FILES = ("operator_side.py", "layouts.py", "gamepad.py", "driver.py", "device.py")
 """Test files in the order in which they run; the last two leave a controller plugged in"""
 _LIMIT_S = 3600.0
 _LAST_WORDS = 25

@@ -171,7 +171,6 @@ class Feed:
         self._next_s = 0.0
 
     def step(self, now_s: float) -> None:
-        """Send everything to the console if it is due at `now_s`."""
         self._console.receive()
         if now_s < self._next_s:
             return

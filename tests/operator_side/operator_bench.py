@@ -53,7 +53,6 @@ class Bench:
         self.side.read_state(state, self.now_s)
 
     def hands(self, *buttons: Button, **state: Any) -> None:
-        """Let the operator side read a controller's state with these buttons held."""
         self.side.read_state(ControllerState(pressed=frozenset(buttons), **state), self.now_s)
 
     def payloads(self) -> list[bytes]:

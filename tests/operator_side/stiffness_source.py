@@ -16,13 +16,7 @@ class StiffnessSource(ServingRobot):
         self.state: MotionState = "armed"
         self.silent = False
 
-    @property
-    def commands(self) -> int:
-        """Number of motion commands received."""
-        return self.session.motion_received
-
     def tick(self, now_s: float) -> None:
-        """Send the owner of the lease the stiffness that the test has set."""
         self.session.update(now_s)
         for owner in () if self.silent else self.session.owners(now_s):
             self.sockets.send(owner.peer, encode(felt(owner.header, r2=self.r2, state=self.state)))

@@ -1,5 +1,3 @@
-"""Table of the controllers that --device selects."""
-
 from pathlib import Path
 from typing import get_args
 

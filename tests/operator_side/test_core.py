@@ -178,19 +178,6 @@ def test_the_status_shows_where_we_stand_and_the_summary_each_standing(bench: Be
     assert bench.side.status(bench.now_s).link is LinkState.LOST
 
 
-def test_why_it_stopped_is_shown_once_it_has_been_armed(bench: Bench) -> None:
-    bench.notice(SessionState.DISARMED, "first come, and always disarmed")
-    bench.feel(0, "disarmed")
-    assert bench.side.status(bench.now_s).stopped_because is None
-    bench.feel(0)
-    assert bench.side.status(bench.now_s).stopped_because is None
-    bench.notice(SessionState.STOPPED, "emergency stop")
-    bench.feel(0, "stopped")
-    assert bench.side.status(bench.now_s).stopped_because == "emergency stop"
-    bench.notice(SessionState.STOPPED_READY, "may be armed again")
-    assert bench.side.status(bench.now_s).stopped_because == "emergency stop"
-
-
 def permit(bench: Bench, **fields: Any) -> None:
     notice = LeaseNotice(
         bench.robot.stamp(bench.now_s), session=SessionState.DISARMED, why="", token=7, waiting=0, may_tune=True

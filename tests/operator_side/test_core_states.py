@@ -135,7 +135,6 @@ class Core(RuleBasedStateMachine):
 
     @rule(event=st.sampled_from(["unplugged", "stop pressed on a page", "robot side restarted"]))
     def happen(self, event: str) -> None:
-        """Let a rare event happen."""
         if event == "unplugged":
             self.bench.side.controller_lost(self.bench.now_s)
             self.hands, self.held, self.lost_s = None, None, self.bench.now_s

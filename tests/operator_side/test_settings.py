@@ -1,5 +1,3 @@
-"""Settings of the operator side: from a file and from flags; each refusal is one line."""
-
 import math
 import secrets
 from pathlib import Path

@@ -9,7 +9,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -22,8 +22,6 @@ from tests.helpers.repository import ROOT
 
 NAME = "robot.lan"
 """Host name by which the operator's host finds the robot's"""
-NOBODY = "198.18.0.99"
-"""IP address in the LAN that no machine has"""
 _CLOCK_AHEAD_S = 100_000
 _MODULES = {"feelahead-robot": "robot_side", "feelahead-operator": "operator_side"}
 
@@ -32,14 +30,10 @@ Status = dict[str, Any]
 
 @dataclass(frozen=True)
 class Host:
-    """A user's account on one of the two machines."""
-
     machine: Machine
     home: Path
     clock: tuple[str, ...] = ()
     """Command prefix by which programs of this account get a separate monotonic clock; empty: the machine's"""
-    also: dict[str, str] = field(default_factory=dict)
-    """Additional environment variables of programs"""
 
     def surroundings(self) -> list[str]:
         """Return the command prefix that runs a program on this machine, as this user."""
@@ -51,11 +45,10 @@ class Host:
             "PYTHONPATH": str(ROOT),
             "NUMBA_CACHE_DIR": str(machine_code_folder()),  # Each would compile for half a minute.
         }
-        given = folders | variables | self.also
+        given = folders | variables
         return [*self.machine.surroundings, *self.clock, "env", *(f"{name}={value}" for name, value in given.items())]
 
     def user(self, name: str) -> "Host":
-        """Return the account of another user on the same machine."""
         return replace(self, home=self.home.with_name(f"{self.home.name}-{name}"))
 
     def run(self, command: str, *, codes: tuple[int, ...] = (0,)) -> str:
@@ -76,8 +69,6 @@ _FOLDERS = (("CONFIG", ".config"), ("CACHE", ".cache"), ("DATA", ".local/share")
 
 
 class Side:
-    """One running side, and the statuses and notes that it has printed."""
-
     def __init__(self, command: str, host: Host, more: tuple[str, ...] = ()) -> None:
         """command: line of the guide that starts a side. more: additional arguments of the test."""
         program, *arguments = shlex.split(command.replace("~/", f"{host.home}/"))
@@ -89,7 +80,6 @@ class Side:
 
     @property
     def status(self) -> Status:
-        """Newest status; empty before the first."""
         return self.said[-1] if self.said else {}
 
     def listen(self) -> None:
@@ -123,21 +113,15 @@ class Lan:
         self.mended = 0
         """Number of tests that had failed by the last `mend`"""
         operator.own_files.mkdir(parents=True)
-        (operator.own_files / "resolv.conf").write_text(f"nameserver {NOBODY}\n")
         self.tell_name(robot.address)
 
-    def tell_name(self, address: str | None) -> None:
-        """Set the address that the operator's host has for the robot's name.
-
-        None: the name cannot be resolved, as no name server answers.
-        """
-        names = "127.0.0.1 localhost\n" + (f"{address} {NAME}\n" if address else "")
+    def tell_name(self, address: str) -> None:
+        """Set the address that the operator's host has for the robot's name."""
         # In place: the running programs have this very file as /etc/hosts.
         with (self.operator_host.machine.own_files / "hosts").open("w", encoding="ascii") as hosts:
-            hosts.write(names)
+            hosts.write(f"127.0.0.1 localhost\n{address} {NAME}\n")
 
     def ask_doctor(self, code: int, words: str) -> None:
-        """Run `feelahead doctor`; assert that it ends with exit code `code` and prints `words`."""
         assert self.doctor is not None
         assert words in self.operator_host.run(self.doctor, codes=(code,))
 
@@ -145,12 +129,10 @@ class Lan:
 
     @property
     def robot(self) -> Side:
-        """The running robot side."""
         return self._sides["robot"]
 
     @property
     def operator(self) -> Side:
-        """The running operator side."""
         return self._sides["operator"]
 
     def start(self, name: str, host: Host | None = None, *more: str, called: str | None = None) -> Side:
@@ -168,19 +150,17 @@ class Lan:
         assert code == 0, f"the {called} side ended with code {code}"
 
     def kill(self, called: str) -> None:
-        """Kill a side with kill -9."""
         with self._sides.pop(called).process as process:
             os.kill(process.process_id, signal.SIGKILL)
 
-    def restart(self, host: Callable[[Host], Host] = lambda host: host) -> None:
-        """End all sides, then start both again, with a new scene. `host` may change the accounts that run them."""
+    def restart(self) -> None:
+        """End all sides, then start both again, with a new scene."""
         self.end_all()
-        self.start("robot", host(self.robot_host))
+        self.start("robot")
         self.until("robot", "it listens", bool)
-        self.start("operator", host(self.operator_host))
+        self.start("operator")
 
     def end_all(self) -> None:
-        """End all sides, by force if necessary."""
         with contextlib.ExitStack() as stack:
             for side in self._sides.values():
                 stack.enter_context(side.process)
@@ -209,7 +189,6 @@ class Lan:
     # Waiting
 
     def listen(self) -> None:
-        """Read new events of all sides."""
         for side in list(self._sides.values()):
             side.listen()
 
@@ -271,7 +250,6 @@ class Lan:
 
 
 def is_armed(status: Status) -> bool:
-    """Return whether the arm is armed, by this status."""
     return bool(status["state"] == "armed")
 
 
@@ -287,12 +265,10 @@ def silence(stop: Status) -> str:
 
 
 def is_moving(status: Status) -> bool:
-    """Return whether the arm is armed and a trigger is pulled, by this status."""
     return is_armed(status) and max(status["L2_pulled"] or 0.0, status["R2_pulled"] or 0.0) > 0.05
 
 
 def is_done(status: Status) -> bool:
-    """Return whether the scripted person has finished the task or found no target."""
     return status.get("person") in (Doing.DONE, Doing.NO_TARGET)
 
 

@@ -78,30 +78,6 @@ def test_packets_of_576_bytes(lan: Lan) -> None:
     assert int(segment[1]) <= _MOST_SEGMENT
 
 
-def test_both_sides_end_while_a_name_server_is_silent(lan: Lan) -> None:
-    lan.moving()
-    lan.tell_name(None)
-    lan.end("robot")
-    lan.until("operator", "the link is lost", lambda status: status["link"] != "up")
-    lan.end("operator")
-    lan.tell_name(lan.robot_host.machine.address)
-    lan.restart()
-
-
-@pytest.mark.quiet
-def test_control_goes_on_while_views_reconnect_and_a_name_server_is_silent(lan: Lan) -> None:
-    """A revocation lets all views connect again."""
-    lan.robot_host.run(f"feelahead keys allow carol {lan.words['OPERATOR-KEY'][:-4]}0000")
-    lan.moving()
-    lan.tell_name(None)
-    try:
-        with judged():
-            lan.robot_host.run("feelahead keys revoke carol")
-            assert all(is_armed(lan.robot.status) for _ in lan.watch(2.0)), lan.robot.status["stopped_because"]
-    finally:
-        lan.tell_name(lan.robot_host.machine.address)
-
-
 @pytest.mark.quiet
 def test_the_arm_stops_120_ms_after_the_last_command_at_most(lan: Lan) -> None:
     lan.moving()

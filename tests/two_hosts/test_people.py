@@ -2,17 +2,13 @@
 
 import json
 import time
-from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
-from tests.helpers.machines.quiet import judged
-from tests.two_hosts.lan import Host, Lan, is_armed, silence
+from tests.two_hosts.lan import Lan, is_armed
 
 pytestmark = [pytest.mark.two_hosts, pytest.mark.processes]
 
-_AN_HOUR_S = 3600
 _REFUSED = "does not let this key in"
 
 
@@ -56,25 +52,6 @@ def test_revoked_while_driving(lan: Lan) -> None:
     lan.back()
 
 
-def test_the_robot_side_killed(lan: Lan) -> None:
-    lan.moving()
-    lan.kill("robot")
-    lan.until("operator", "the triggers are free", lambda status: status["triggers_released"] is True)
-    lan.until("operator", "the link is lost", lambda status: status["link"] == "lost")
-    lan.start("robot")
-    lan.until("robot", "it listens", bool)
-    lan.back()
-
-
-def test_the_operator_side_killed(lan: Lan) -> None:
-    lan.moving()
-    lan.kill("operator")
-    silence(lan.until("robot", "the arm is stopped", lambda status: not is_armed(status)))
-    lan.until("robot", "the lease is free", lambda status: status["owner"] is None)
-    lan.start("operator")
-    lan.back()
-
-
 def test_the_operator_side_first(lan: Lan) -> None:
     for side in ("operator", "robot"):
         lan.end(side)
@@ -83,41 +60,3 @@ def test_the_operator_side_first(lan: Lan) -> None:
     lan.start("robot")
     lan.until("robot", "it listens", bool)
     lan.back()
-
-
-@pytest.mark.quiet
-def test_a_wall_clock_stepped_by_an_hour_and_back(lan: Lan) -> None:
-    """Only both sides' processes see the changed wall clock; the arm must go on moving."""
-    libraries = sorted(Path("/usr/lib").glob("*/faketime/libfaketimeMT.so.1"))
-    if not libraries:
-        pytest.skip("no libfaketime here (apt install libfaketime)")
-    offset = lan.robot_host.home.with_name("wall-clock")
-    faked = {
-        "LD_PRELOAD": str(libraries[0]),
-        "FAKETIME_TIMESTAMP_FILE": str(offset),
-        "FAKETIME_NO_CACHE": "1",
-        "DONT_FAKE_MONOTONIC": "1",
-    }
-
-    def under_it(host: Host) -> Host:
-        return replace(host, also=faked)
-
-    def step(offset_s: int) -> int:
-        """Shift the wall clock of both sides by `offset_s`; return the time, in seconds, that it now shows."""
-        partial = offset.with_suffix(".new")
-        partial.write_text(f"+{offset_s}\n", encoding="ascii")
-        partial.replace(offset)
-        return int(under_it(lan.robot_host).run("date +%s"))
-
-    step(0)
-    lan.restart(under_it)
-    try:
-        lan.moving()
-        with judged():
-            before_s = step(0)
-            assert _AN_HOUR_S <= step(_AN_HOUR_S) - before_s < _AN_HOUR_S + 60
-            for _ in range(2):
-                assert all(is_armed(lan.robot.status) for _ in lan.watch(1.5)), lan.robot.status["stopped_because"]
-                step(0)
-    finally:
-        lan.restart()

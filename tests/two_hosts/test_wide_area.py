@@ -1,14 +1,8 @@
 """Both sides over the kernel's TCP with delay, loss, rate and queue: they fill no queue, and the arm does not stop."""
 
-import subprocess
-import sys
-from pathlib import Path
-
 import pytest
 
 from tests.helpers.machines.quiet import judged
-from tests.helpers.machines.waiting import wait_until
-from tests.helpers.repository import ROOT
 from tests.two_hosts.wide_area.running import run_trial
 from tests.two_hosts.wide_area.trial import Trial
 from tests.two_hosts.wide_area.tunnels import what_is_missing
@@ -47,22 +41,3 @@ def test_armed_without_a_stop_and_without_a_queue(trial: Trial) -> None:
 def test_hands_that_rest_take_little_of_a_link() -> None:
     outcome = run_trial(Trial(delay=5.0, person="rests", seconds=8.0))
     assert 0.0 < outcome["to_operator_kbit_s"] < _RESTING_KBIT_S
-
-
-_OPENS = """
-from tests.two_hosts.wide_area.tunnels import WideArea
-with WideArea({}) as wide:
-    print(wide.surroundings("robot")[3], flush=True)
-    input()
-"""
-
-
-def test_killed_it_leaves_nothing() -> None:
-    command = [sys.executable, "-c", _OPENS]
-    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, cwd=ROOT) as opened:
-        assert opened.stdout is not None
-        namespace = Path("/run/netns", opened.stdout.readline().strip())
-        assert namespace.exists()
-        assert namespace.name.startswith("feelahead-wide-robot-")
-        opened.kill()
-    wait_until("deleted", lambda: not namespace.exists())

@@ -8,7 +8,6 @@ from msgspec import Meta
 from common.command.command_line import load_toml, parse_settings
 from common.command.run_options import RunOptions
 from common.limits import check_limits
-from tests.helpers.python_process import ended
 from tests.helpers.refusal import refusal
 
 
@@ -23,8 +22,6 @@ class Inner:
 
 @dataclass(frozen=True)
 class Options(RunOptions):
-    """Settings of an imaginary command."""
-
     probability: float = 0.99
     camera: Inner = field(default_factory=Inner)
     size_m: Annotated[float, Meta(ge=0.0)] = 1.0
@@ -102,23 +99,3 @@ def test_bad_files_become_one_line_that_names_file_and_key(tmp_path: Path, conte
     assert "bad.toml" in text
     assert "sys." not in text
     assert len(text) < 1000
-
-
-@pytest.mark.processes
-@pytest.mark.parametrize("encoding", ["utf-8", "ascii"])
-def test_the_line_is_the_same_where_no_box_can_be_drawn(encoding: str) -> None:
-    code = (
-        "from tests.common.command.test_command_line import parse\n"
-        "from common.errors import ConfigurationError\n"
-        "for arguments in (['--duration', 'x'], ['--nonsense', '1'], ['--seed', 'y'], ['--link-model', 'pigeon']):\n"
-        "    try: parse(*arguments)\n"
-        "    except ConfigurationError as error: print(error)\n"
-    )
-    _, said, _ = ended("-c", code, PYTHONIOENCODING=encoding, LC_ALL="C")
-    assert said.splitlines() == [
-        "--duration: 'x'; valid: a number",
-        "Unrecognized options: --nonsense, 1 (valid flags and values: prog --help)",
-        "--seed: invalid literal for int() with base 10: 'y'; valid: a whole number",
-        "invalid choice 'pigeon' for argument '--link-model'. Expected one of ('datagram', 'stream'). "
-        "(valid flags and values: prog --help)",
-    ]

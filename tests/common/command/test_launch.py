@@ -1,5 +1,3 @@
-"""Start and end of a command: signals, encodings, versions and missing packages."""
-
 import contextlib
 import json
 import os
@@ -16,7 +14,6 @@ from tests.helpers.machines.waiting import LIMIT_S
 from tests.helpers.python_process import ended, start
 from tests.helpers.repository import ROOT
 
-MODULES = ("robot_side", "operator_side", "feelahead")
 # The code stops at this point, so that the signal finds it however fast the machine is.
 STOPPED_AT = """
 import sys, time
@@ -99,14 +96,6 @@ def test_a_signal_sets_the_flag_and_the_old_handler_comes_back(number: signal.Si
     assert caught == []
     signal.raise_signal(number)
     assert caught == [number]
-
-
-@pytest.mark.processes
-@pytest.mark.parametrize("module", MODULES)
-def test_every_command_says_its_version(module: str) -> None:
-    code, said, complaint = ended("-m", module, "--version")
-    assert (code, complaint) == (0, "")
-    assert said.split()[1].count(".") == 2
 
 
 WITHOUT_MUJOCO = """

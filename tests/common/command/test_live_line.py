@@ -10,7 +10,7 @@ from msgspec.structs import replace as replaced
 from rich.cells import cell_len
 
 from common.command.live_line import _facts, live_line
-from common.command.live_story import SHORTEST_GAP_S, Resistance, Story, next_resistance
+from common.command.live_story import Resistance, Story, next_resistance
 from common.command.live_view import LiveView
 from common.protocol.session import SessionState
 from common.status.codes import ConnectionState, Doing, LinkState, Sight
@@ -61,12 +61,6 @@ views = st.builds(
     holding=names,
     stands=st.booleans(),
 )
-
-
-def test_eighty_columns_tell_everything() -> None:
-    assert live_line(approach(), 79) == ("advancing  L2/R2 pull 0/62% resist 0/34%  near 84mm  target 120mm  link 12ms")
-    far = approach(r2_pulled=1.0, r2=1.0, nearest_mm=144.0, target_mm=193.0, delay_ms=205.0)
-    assert live_line(far, 79) == ("advancing  L2/R2 pull 0/100% resist 0/100% near 144mm target 193mm link 205ms")
 
 
 @pytest.mark.parametrize(
@@ -202,11 +196,6 @@ def test_a_stiffness_that_hovers_is_one_word(stiffnesses: list[float], expected:
         word = next_resistance(word, stiffness)
         words.append(str(int(word)))
     assert " ".join(words) == expected
-
-
-def test_what_goes_to_and_fro_is_bounded() -> None:
-    flapping = [advancing(person=(Doing.ADVANCING, Doing.GRASPING)[step % 2]) for step in range(1000)]
-    assert len(told(*flapping, step_s=0.01)) <= 10.0 / SHORTEST_GAP_S + 1
 
 
 def test_an_alarm_does_not_wait_even_if_it_is_short() -> None:

@@ -1,5 +1,3 @@
-"""Output that never blocks the program: in order while read, dropped while nobody reads, its end reported once."""
-
 import contextlib
 import os
 import threading
@@ -19,8 +17,6 @@ def pipe() -> Iterator[tuple[int, TextIO]]:
 
 
 class Reader(threading.Thread):
-    """Thread that reads all lines until the end of the output."""
-
     def __init__(self, descriptor: int) -> None:
         super().__init__(daemon=True)
         self._descriptor = descriptor
@@ -29,19 +25,6 @@ class Reader(threading.Thread):
     def run(self) -> None:
         with os.fdopen(self._descriptor, encoding="utf-8") as stream:
             self.said = stream.read().splitlines()
-
-
-def test_a_reader_that_stalls_gets_whole_lines_and_holds_nobody_up() -> None:
-    line = "x" * 9_999 + "\n"
-    with pipe() as (reads, stream):
-        output = PatientOutput(stream)
-        with output:
-            for _ in range(1000):
-                output.write(line)
-        held = os.read(reads, 100_000).decode()
-        os.close(reads)
-        output.write("late\n")  # Waits for the thread, which would otherwise write to the descriptor's next owner.
-    assert line * 6 == held[:60_000]
 
 
 def test_a_reader_that_pauses_gets_the_newest_lines_and_every_result() -> None:

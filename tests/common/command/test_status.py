@@ -19,20 +19,6 @@ def events(capsys: pytest.CaptureFixture[str]) -> list[dict[str, Any]]:
     return [json.loads(line) for line in shown(capsys)]
 
 
-def run(mode: StatusMode, seconds: float, start_s: float = 100.0) -> None:
-    """Show a status each millisecond of virtual time, for `seconds`."""
-    with Status(mode, "robot") as status:
-        for tick in range(round(seconds * 1000)):
-            status.show(start_s + tick / 1000, robot=RobotStatus(observers=tick))
-
-
-def test_json_is_one_event_a_line_five_times_a_second(capsys: pytest.CaptureFixture[str]) -> None:
-    run("json", 2.0)
-    found = events(capsys)
-    assert [event["event"] for event in found] == ["status"] * 10
-    assert [event["observers"] for event in found] == pytest.approx(range(0, 2000, 200), abs=10)
-
-
 def test_json_says_codes_and_figures_and_of_each_side_what_it_knows_better(capsys: pytest.CaptureFixture[str]) -> None:
     robot = RobotStatus(link=LinkState.UP, state="armed", l2=0.1, target="carton", real_time=math.nan)
     operator = OperatorStatus(link=LinkState.LOST, holding=True, place=3)

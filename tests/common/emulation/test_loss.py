@@ -9,8 +9,6 @@ from tests.helpers.link_runs import Run, bursts, lag_one
 
 pytestmark = pytest.mark.long
 
-# Loss
-
 
 def test_random_loss_is_independent() -> None:
     lost = Run("loss 10%", 50_000).lost
@@ -24,9 +22,6 @@ def test_gilbert_elliott_loses_in_bursts_of_the_length_asked_for() -> None:
     assert np.mean(bursts(lost)) == pytest.approx(4.0, abs=0.25)
     lengths = np.array(bursts(lost))
     assert np.mean(lengths > 4) == pytest.approx(0.75**4, abs=0.03)
-
-
-# Delay
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,3 @@
-"""Reading of links in netem's words: what is accepted, and what is refused in one line."""
-
 from pathlib import Path
 
 import pytest
@@ -53,14 +51,12 @@ WORDS = (
     ("spec", "named", "valid"),
     [
         ("50ms", "'50ms'", "delay TIME"),
-        ("delay 50ms delay 60ms", "'delay'", "delay TIME"),
         ("delay 50", "'50'", "50ms"),
         ("delay -50ms", "'-50ms'", "0s or longer"),
         ("delay 50ms 10ms 101%", "'101%'", "0% to 100%"),
         ("delay 50ms distribution normal", "'distribution'", "delay TIME"),
         ("delay 50ms 10ms distribution gauss", "'gauss'", "uniform, normal"),
         ("loss", "'loss' is given without probability", "loss [random]"),
-        ("loss 1% 2% 3%", "'3%'", "delay TIME"),
         ("reorder 25%", "'reorder' is given without a delay", "delay TIME"),
         ("delay 1ms reorder 25% gap 0", "'0'", "from 1"),
         ("rate 0mbit", "'0mbit'", "more than 0bit"),
@@ -71,13 +67,11 @@ WORDS = (
         ("trace nowhere.csv", "'nowhere.csv'", "delay_ns"),
         ("outage 2s", "'outage' is given without 'at'", "outage DURATION at TIME"),
         ("outage 0s at 1s", "duration_s = 0.0", "above 0"),
-        ("slot 1ms", "'slot' is unknown", "delay TIME"),
         ("loss state 1%", "'loss state'", "gemodel"),
         ("delay 5ms 1ms distribution my.dist", "'my.dist'", "paretonormal, exponential"),
         ("outage 2s at 1s every 2s", "every 2.0 s", "longer than an outage lasts, 2 s"),
         ("retransmit 200ms", "'retransmit'", "retransmit TIME"),
         ("delay 50ms 'loss", "no closing quotation", "quotes in pairs"),
-        ("''", "''", "delay TIME"),
         ("to_robot: delay 50ms", "'to_robot:'", "delay TIME"),
     ],
 )

@@ -1,5 +1,3 @@
-"""Changes of an emulated link during a run: which are possible, and how the delay line adopts them."""
-
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -73,12 +71,3 @@ def test_what_waits_leaves_when_it_was_due_and_what_comes_follows_the_new_profil
     assert line.pop(0.1) == [b"old"]
     assert line.figures.sent == 2
     assert line.summary()["asked"] == "delay 10ms"
-
-
-def test_a_line_that_changes_to_the_same_goes_on_as_it_was() -> None:
-    one, other = (DelayLine[int](LinkProfile.parse("delay 50ms 10ms distribution normal loss 10%", 5)) for _ in "ab")
-    for step in range(1000):
-        one.push(1e-3 * step, step)
-        other.push(1e-3 * step, step)
-        other.change(one.profile)
-    assert one.pop(2.0) == other.pop(2.0)

@@ -1,5 +1,3 @@
-"""A file is written whole or not at all, and one line says if it cannot be written."""
-
 import errno
 import json
 import os
@@ -15,7 +13,6 @@ from common.files.output_file import output_file, require_output_file, write_jso
 
 
 def fill_up(path: Path) -> None:
-    """Write a part of the file, then fail as on a full disk."""
     with output_file("--csv", path) as file:
         file.write("new " * 10_000)
         file.flush()

@@ -1,5 +1,3 @@
-"""A wrong value in a TOML file: the error names its key, the value, and what would be valid."""
-
 from pathlib import Path
 
 import pytest

@@ -1,5 +1,3 @@
-"""TOML files named by a person are read whole and without waiting, or refused."""
-
 from pathlib import Path
 
 import pytest

@@ -63,8 +63,6 @@ class Bottleneck:
 
 @dataclass
 class Ran:
-    """Results of a run: delays, rates and pictures."""
-
     delays_s: list[tuple[float, float]] = field(default_factory=list)
     """(time of sending, delay) of each haptic message, in seconds"""
     rates_bit_s: list[float] = field(default_factory=list)
@@ -111,7 +109,6 @@ class _Sides:
         return True
 
     def take(self, now_s: float) -> None:
-        """Receive what has arrived at both sides."""
         for kind, content in self._out.pop(now_s):
             if kind == "haptics":
                 self.ran.delays_s.append((content.header.sent_s, now_s - content.header.sent_s))
@@ -126,7 +123,6 @@ class _Sides:
         self.ran.budget.hear(self._robot.outgoing, now_s)
 
     def feel(self, now_s: float) -> None:
-        """Send haptics, telemetry and commands that are due."""
         budget = self.ran.budget
         if self._due("haptics", max(_HAPTICS_S, budget.haptic_interval_s), now_s):
             budget.spend("haptics", 200, now_s)

@@ -1,5 +1,3 @@
-"""Budget: urgent messages are never delayed, paced ones keep to the rate, what is cut in pieces arrives unchanged."""
-
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st

@@ -1,5 +1,3 @@
-"""Pieces of a picture are joined in any order; hostile or incomplete ones are rejected."""
-
 import random
 
 from hypothesis import given

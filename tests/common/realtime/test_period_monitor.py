@@ -1,5 +1,3 @@
-"""A loop that cannot keep its period reports the reason once a run. Time, and the machine's counters, are simulated."""
-
 import pytest
 
 from common.clock import VirtualClock

@@ -1,5 +1,3 @@
-"""Linux's counters of the time for which a thread had to wait for the processor."""
-
 from pathlib import Path
 
 import pytest

@@ -1,5 +1,3 @@
-"""Recordings in other forms of MCAP: the same messages in the same order, or a refusal that gives the reason."""
-
 import io
 from collections.abc import Callable
 from pathlib import Path

@@ -43,16 +43,3 @@ def test_a_field_that_a_message_gets_is_in_the_schema(topic: str, kind: type[msg
     described = json_schema(topic, TYPES[topic])
     assert [*described["properties"]][-len(declared) :] == declared
     assert described["title"] == f"feelahead.{topic[1:].title()}"
-
-
-def test_what_no_schema_would_have_told_by_its_first_message() -> None:
-    stiffness = json_schema("/stiffness", TYPES["/stiffness"])["properties"]
-    assert stiffness["around"]["type"] == ["object", "null"]
-    assert stiffness["around"]["properties"]["steps"] == {"type": "string", "contentEncoding": "base64"}
-    assert stiffness["l2"]["properties"]["fast_m"] == {
-        **{"type": "array", "minItems": 8, "maxItems": 8},
-        "items": {"type": "number"},
-    }
-    status = json_schema("/robot/status", TYPES["/robot/status"])["properties"]
-    assert status["state"] == {"enum": ["armed", "disarmed", "stopped", None], "type": ["string", "null"]}
-    assert status["target"] == {"type": ["string", "null"]}

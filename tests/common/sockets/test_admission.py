@@ -33,8 +33,6 @@ DESCRIPTORS = (10_000, 10_001, 10_002)
 
 @dataclass(eq=False)
 class Line:
-    """One connection of the model, open or closed."""
-
     name: bytes
     key: str
     descriptor: int

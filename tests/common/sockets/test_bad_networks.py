@@ -1,5 +1,3 @@
-"""Networks that drop packets without an answer, and names that do not resolve: nothing waits for them."""
-
 import socket
 import threading
 from collections.abc import Iterator

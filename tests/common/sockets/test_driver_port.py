@@ -1,5 +1,3 @@
-"""Port to which a driver process connects, over real sockets on loopback."""
-
 from pathlib import Path
 
 import pytest
@@ -24,7 +22,6 @@ def driver(context: "zmq.Context[zmq.Socket[bytes]]", port: DriverPort, name: by
 
 
 def heard(port: DriverPort) -> list[tuple[bytes, bytes]]:
-    """Wait for messages at the port; return them."""
     for _ in range(_ROUNDS):
         port.wait(0.01)
         if found := port.receive():

@@ -1,5 +1,3 @@
-"""Addresses that the sockets refuse, with what words, and the view port that follows from a control address."""
-
 import re
 from collections.abc import Callable
 
@@ -10,13 +8,6 @@ from common.sockets.operator import OperatorSockets
 from common.sockets.robot import RobotSockets
 from tests.helpers.refusal import refusal
 from tests.helpers.socket_talk import EPHEMERAL, greet, publish_until_seen
-
-
-def test_reports_the_ports_that_the_system_chose(robot: RobotSockets) -> None:
-    with RobotSockets("tcp://127.0.0.1:*") as another:
-        endpoints = [robot.control_endpoint, robot.view_endpoint, another.control_endpoint, another.view_endpoint]
-    assert len(set(endpoints)) == 4
-    assert all(re.fullmatch(r"tcp://127\.0\.0\.1:[1-9]\d*", endpoint) for endpoint in endpoints)
 
 
 def port_of(endpoint: str) -> int:

@@ -1,20 +1,14 @@
-"""Strangers who send anything by raw TCP to an open port: the operator is always heard, and nothing accumulates."""
-
 import contextlib
-import os
 import random
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-import zmq
 
 from common.clock import MonotonicClock
-from common.silence import MOTION_PERIOD_S
 from common.sockets import robot as robot_sockets
 from common.sockets.allow_list import AllowList
 from common.sockets.authentication import RobotKeys, make_key_pair
-from common.sockets.descriptors import shut_down
 from common.sockets.keys import KeyFolder
 from common.sockets.operator import OperatorSockets
 from common.sockets.robot import RobotSockets
@@ -122,62 +116,6 @@ def test_a_crowd_is_hung_up_on_and_connected_peers_stay(monkeypatch: pytest.Monk
             assert is_heard(robot, late)
 
 
-def come_and_go(robot: RobotSockets, endpoint: str, count: int) -> None:
-    """Let `count` strangers connect and leave while the robot side reads nothing."""
-    before = descriptors()
-    crowd = [RawConnection(port_of(endpoint)) for _ in range(count)]
-    assert any(descriptors() >= before + 2 * count for _ in range(ROUNDS) if not robot.wait(0.01))
-    for connection in crowd:
-        connection.close()
-    assert any(descriptors() <= before for _ in range(ROUNDS) if not robot.wait(0.01))
-
-
-def test_a_crowd_that_has_left_before_anybody_looked_is_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(robot_sockets, "MOST_CONNECTIONS", 20)
-    with RobotSockets(EPHEMERAL, heartbeat_timeout_s=PATIENT_S) as robot:
-        for endpoint in (robot.control_endpoint, robot.view_endpoint):
-            come_and_go(robot, endpoint, 100)
-            robot.receive()
-        assert robot.crowded == 0
-
-
-def test_the_new_owner_of_a_strangers_descriptor_is_not_hung_up_on(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(robot_sockets, "MOST_CONNECTIONS", 20)
-    monkeypatch.setattr(robot_sockets, "_EVENTS_PER_CALL", 10)
-    hung_up: list[int] = []
-    monkeypatch.setattr(robot_sockets, "shut_down", hung_up.append)
-    with RobotSockets(EPHEMERAL, heartbeat_timeout_s=PATIENT_S) as robot:
-        come_and_go(robot, robot.view_endpoint, 100)
-        with OperatorSockets(robot.control_endpoint, robot.view_endpoint, heartbeat_timeout_s=PATIENT_S) as operator:
-            assert is_heard(robot, operator)
-            for _ in range(50):
-                robot.receive()
-            assert hung_up == []
-            assert robot._all_seen
-
-
-def test_an_ended_connection_is_left_alone() -> None:
-    reading, writing = os.pipe()
-    shut_down(reading)
-    os.close(writing)
-    assert os.read(reading, 1) == b""
-    os.close(reading)
-    shut_down(reading)
-
-
-def test_a_peer_back_under_its_name_is_no_stranger(robot: RobotSockets) -> None:
-    before = descriptors()
-    for _ in range(2):
-        with zmq.Context() as context, context.socket(zmq.DEALER) as dealer:
-            dealer.setsockopt(zmq.LINGER, 0)
-            dealer.setsockopt(zmq.ROUTING_ID, b"same")
-            dealer.connect(robot.control_endpoint)
-            dealer.send(b"here")
-            assert drain(robot, PATIENT_S) == [b"here"]
-            assert robot._peers.connections[b"same"].descriptor in robot._gates[0].connections._known
-        assert until_descriptors_are(before, robot)
-
-
 def test_the_largest_message_that_is_allowed_arrives_and_the_next_larger_does_not(robot: RobotSockets) -> None:
     with contextlib.closing(stranger(robot)) as connection:
         connection.send(message(bytes(CONTROL_LIMIT_BYTES)))
@@ -226,19 +164,6 @@ def test_a_peer_that_floods_is_cut_off_and_the_operator_is_not(
     assert robot.flooding > 0
     assert received <= 200
     assert is_heard(robot, operator)
-
-
-def test_sending_more_than_twenty_operators_floods(robot: RobotSockets, monkeypatch: pytest.MonkeyPatch) -> None:
-    within_one_second(robot, monkeypatch)
-    most = round(20 / MOTION_PERIOD_S)
-    with contextlib.closing(stranger(robot)) as connection:
-        connection.send(message(b"x") * (most + 1))
-        received: list[bytes] = []
-        while not robot.flooding:
-            assert robot.wait(PATIENT_S)
-            received += [payload for _, payload in robot.receive()]
-        assert received == [b"x"] * most
-        assert connection.ended()
 
 
 def test_the_view_port_takes_nothing_large_and_survives_garbage(robot: RobotSockets, operator: OperatorSockets) -> None:

@@ -1,5 +1,3 @@
-"""A gate, which watches a socket's connections, may be closed before the socket."""
-
 import zmq
 
 from common.sockets.gate import Gate

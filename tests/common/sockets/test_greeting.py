@@ -1,5 +1,3 @@
-"""Which first bytes of a TCP connection count as the greeting of a ZeroMQ peer."""
-
 import pytest
 
 from common.sockets.greeting import KNOCK, mechanism_of

@@ -9,10 +9,8 @@ import zmq
 
 from common.sockets import inbox as inbox_module
 from common.sockets.inbox import Inbox
-from common.sockets.operator import OperatorSockets
 from common.sockets.readable import readable as readable_now
-from common.sockets.robot import RobotSockets
-from tests.helpers.socket_talk import PATIENT_S, greet, publish_until_seen
+from tests.helpers.socket_talk import PATIENT_S
 
 
 @pytest.fixture
@@ -40,7 +38,6 @@ def pair() -> Iterator[tuple["zmq.Socket[bytes]", "zmq.Socket[bytes]"]]:
 
 
 def signal_of(inbox: Inbox) -> bool:
-    """Wait for the inbox's descriptor to signal; return whether it does in time."""
     return bool(select.select([inbox.descriptor], [], [], PATIENT_S)[0])
 
 
@@ -73,38 +70,3 @@ def test_a_signal_that_another_use_took_is_no_message_lost(
     inbox.used()
     assert inbox.has_some()
     assert [frame.bytes for message in inbox.read() for frame in message] == [b"second"]
-
-
-def test_a_turn_drains_once_and_asks_each_socket_three_times_at_most(
-    robot: RobotSockets, operator: OperatorSockets, asked: list[Any], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Both ends send and receive one message a turn. They ask for EVENTS after sending, before reading and after it."""
-    peer = greet(robot, operator)
-    selects: list[int] = []
-    really = select.select
-
-    def counted(*arguments: Any) -> Any:
-        selects.append(1)
-        return really(*arguments)
-
-    monkeypatch.setattr(select, "select", counted)
-    publish_until_seen(robot, operator, b"topic")
-    assert operator.receive_view()
-    most, waits = 0, 0
-    for turn in range(50):
-        asked.clear()
-        assert operator.send(b"%d" % turn)
-        assert robot.wait(PATIENT_S)
-        assert [payload for _, payload in robot.receive()] == [b"%d" % turn]
-        assert robot.send(peer, b"%d" % turn)
-        assert operator.wait(PATIENT_S)
-        assert operator.receive() == [b"%d" % turn]
-        assert operator.receive_view() == []
-        waits += 2
-        most = max(
-            most, *(asked.count(part) for part in (robot._control, *(way.part for way in operator._connections)))
-        )
-        assert operator._view not in asked, "whose descriptor says nothing"
-    # ZeroMQ may signal for its own affairs, such as a pipe with room again: this costs one more query.
-    assert most <= 4
-    assert len(selects) <= 2 * waits

@@ -1,5 +1,3 @@
-"""Folder of keys: its files, who may read them, and refusals in one line."""
-
 import errno
 import os
 import stat
@@ -25,7 +23,6 @@ def folder(tmp_path: Path) -> KeyFolder:
 
 @pytest.fixture
 def allowed(folder: KeyFolder) -> AllowList:
-    """Return an allow-list that has read one key, anna's."""
     folder.allow("anna", KEY)
     found = AllowList(folder)
     found.refresh()
@@ -158,9 +155,6 @@ def test_the_next_command_is_named_where_a_key_is_missing(folder: KeyFolder) -> 
     folder.write_pair("operator", KEY, OTHER)
     assert "feelahead keys show robot" in complaint(lambda: OperatorKeys.load(folder.path, None))
     assert OperatorKeys.load(folder.path, KEY).robot == KEY
-
-
-# The list while it is in use
 
 
 def test_a_running_side_notices_added_and_removed_keys(folder: KeyFolder) -> None:

@@ -1,5 +1,3 @@
-"""Keys (CURVE) over real sockets on loopback: which peers get in, which stay out, which are disconnected later."""
-
 import errno
 import socket
 from collections.abc import Iterator
@@ -200,21 +198,6 @@ def test_a_revoked_key_is_cut_off_from_control_and_view_and_others_see_on(robot:
         assert ben_sees
         assert gets_in(robot, ben)
         assert "feelahead keys allow" in str(anna.trouble)
-
-
-def test_an_operator_that_has_left_can_be_revoked(robot: Robot) -> None:
-    with robot.operator("anna") as anna:
-        assert gets_in(robot, anna)
-    descriptors = [Path(f"/proc/self/fd/{each.descriptor}") for each in robot.sockets._peers.connections.values()]
-    clock = MonotonicClock()
-    end_s = clock.now() + LIMIT_S
-    while any(descriptor.exists() for descriptor in descriptors) and clock.now() < end_s:
-        robot.sockets.wait(0.01)
-        robot.sockets.receive()
-    robot.folder.revoke("anna")
-    robot.sockets.refresh_keys()
-    with robot.operator("ben") as ben:
-        assert gets_in(robot, ben)
 
 
 def test_a_view_that_cannot_be_reopened_is_tried_again(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> None:

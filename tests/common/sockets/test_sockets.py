@@ -21,8 +21,6 @@ from tests.helpers.socket_talk import (
     send_until_connected,
 )
 
-# Control
-
 
 def test_a_peer_that_left_is_counted(robot: RobotSockets, operator: OperatorSockets) -> None:
     peer = greet(robot, operator)
@@ -53,13 +51,6 @@ def test_a_flood_never_blocks_and_what_was_taken_arrives(robot: RobotSockets, op
     drain_all(operator.receive, operator.wait, [b"%d" % number for number in taken])
 
 
-def test_a_short_burst_passes_whole(robot: RobotSockets, operator: OperatorSockets) -> None:
-    peer = greet(robot, operator)
-    burst = [b"%d" % number for number in range(10)]
-    assert all(robot.send(peer, payload) for payload in burst)
-    drain_all(operator.receive, operator.wait, burst)
-
-
 def test_one_call_receives_a_bounded_number(
     robot: RobotSockets, operator: OperatorSockets, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -88,9 +79,6 @@ def test_refuses_to_send_more_than_the_other_side_accepts(robot: RobotSockets, o
         robot.publish(b"video", bytes(VIEW_LIMIT_BYTES + 1))
 
 
-# View
-
-
 def test_only_the_topics_asked_for_arrive(robot: RobotSockets) -> None:
     with OperatorSockets(robot.control_endpoint, robot.view_endpoint, topics=[b"telemetry"]) as operator:
         for _ in range(ROUNDS):
@@ -99,17 +87,6 @@ def test_only_the_topics_asked_for_arrive(robot: RobotSockets) -> None:
             if operator.wait(0.01):
                 break
         assert {topic for topic, _ in operator.receive_view()} == {b"telemetry"}
-
-
-# Waiting
-
-
-def test_waiting_without_limit_ends_with_a_message(robot: RobotSockets, operator: OperatorSockets) -> None:
-    send_until_connected(operator, b"hello")
-    assert robot.wait(None)
-    assert robot.wait(0.0)
-    assert len(robot.receive()) == 1
-    assert not robot.wait(0.0)
 
 
 def test_the_operator_wakes_on_either_socket(robot: RobotSockets, operator: OperatorSockets) -> None:
@@ -156,15 +133,3 @@ def test_signals_that_bring_nothing_prolong_no_wait(robot: RobotSockets, monkeyp
     assert clock.now() == pytest.approx(1.0, abs=0.03)
     for descriptor in (reading, writing):
         os.close(descriptor)
-
-
-# Settings and closing
-
-
-def test_closing_twice_and_with_unsent_messages_ends(robot: RobotSockets, operator: OperatorSockets) -> None:
-    peer = greet(robot, operator)
-    for _ in range(5000):
-        robot.send(peer, bytes(1000))
-    for end in (robot, operator):
-        end.close()
-        end.close()

@@ -1,29 +1,19 @@
-"""Several connections of one peer, used one after the other or all at once: also lost, replaced and unread ones."""
-
 import fcntl
-import socket
 import struct
 from collections import Counter
 from contextlib import ExitStack, closing
 from dataclasses import dataclass
-from pathlib import Path
 
 import pytest
-import zmq
 from hypothesis import given
 from hypothesis import strategies as st
 
-from common.sockets import robot as robot_sockets
-from common.sockets.allow_list import AllowList
-from common.sockets.authentication import OperatorKeys, RobotKeys, make_key_pair
 from common.sockets.descriptors import shut_down
-from common.sockets.keys import KeyFolder
 from common.sockets.operator import OperatorSockets
 from common.sockets.peers import Connection, Peers
 from common.sockets.robot import RobotSockets
-from common.sockets.shell import CONTROL_UNSENT_BYTES, VIEW_HIGH_WATER_MARK, VIEW_UNSENT_BYTES
+from common.sockets.shell import VIEW_HIGH_WATER_MARK, VIEW_UNSENT_BYTES
 from common.sockets.turns import (
-    CONNECTIONS,
     MOST_CONNECTIONS_EACH,
     Offered,
     TurnConnection,
@@ -33,7 +23,7 @@ from common.sockets.turns import (
     routing_id,
 )
 from tests.helpers.hostile.raw_zmtp import RawConnection, message, port_of
-from tests.helpers.socket_talk import EPHEMERAL, PATIENT_S, ROUNDS, drain_all, greet, publish_until_seen
+from tests.helpers.socket_talk import PATIENT_S, ROUNDS, drain_all, greet, publish_until_seen
 
 STIFFNESS = bytes(461)
 
@@ -141,115 +131,9 @@ def test_a_connection_that_breaks_off_comes_back_to_the_same_peer(
     assert greet(robot, operator) == peer
 
 
-def test_a_taken_over_routing_id_gives_another_key_neither_the_group_nor_its_answers(tmp_path: Path) -> None:
-    folder, (public, secret) = KeyFolder(tmp_path), make_key_pair()
-    with ExitStack() as stack:
-        robot = stack.enter_context(
-            RobotSockets(EPHEMERAL, keys=RobotKeys(secret, AllowList(folder)), heartbeat_timeout_s=PATIENT_S)
-        )
-        pairs = {name: make_key_pair() for name in ("anna", "ben")}
-        for name, (theirs, _) in pairs.items():
-            folder.allow(name, theirs)
-        robot.refresh_keys()
-        anna = stack.enter_context(
-            OperatorSockets(
-                robot.control_endpoint,
-                robot.view_endpoint,
-                keys=OperatorKeys(pairs["anna"][1], public),
-                heartbeat_timeout_s=PATIENT_S,
-            )
-        )
-        peer = greet(robot, anna)
-        # Only anna and the robot side can know it: the handshake hides it.
-        stolen = min(robot._peers.connections)
-        context = stack.enter_context(zmq.Context())
-        ben = stack.enter_context(context.socket(zmq.DEALER))
-        ben.setsockopt(zmq.LINGER, 0)
-        ben.setsockopt(zmq.ROUTING_ID, stolen)
-        OperatorKeys(pairs["ben"][1], public).secure(ben)
-        ben.connect(robot.control_endpoint)
-        ben.send(b"as anna")
-        heard: list[tuple[bytes, bytes]] = []
-        while not any(payload == b"as anna" for _, payload in heard):
-            assert robot.wait(PATIENT_S)
-            heard += robot.receive()
-        [claimed] = [name for name, payload in heard if payload == b"as anna"]
-        assert claimed != peer
-        for number in range(20):
-            # On a busy machine her connections may be full for a moment.
-            for _ in range(ROUNDS):
-                if robot.send(peer, b"anna's %d" % number, everywhere=number % 2 == 0):
-                    break
-                robot.wait(1e-3)
-            assert anna.wait(PATIENT_S)
-            anna.receive()
-        assert robot.send(claimed, b"ben's")
-        assert ben.poll(round(1e3 * PATIENT_S))
-        assert ben.recv() == b"ben's", "nothing of anna's came before"
-        # Anna's connection was ended, too; she connects again and gets her routing id back.
-        for _ in range(ROUNDS):
-            anna.send(b"anna")
-            robot.wait(0.01)
-            assert {name for name, payload in robot.receive() if payload == b"anna"} <= {peer}
-            if robot._peers.connections[stolen].peer.name == peer:
-                return
-        pytest.fail("anna does not get her connection back")
-
-
-def test_an_operator_of_sixteen_connections_stays_in_in_a_crowd(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(robot_sockets, "MOST_CONNECTIONS", 20)
-    with ExitStack() as stack:
-        robot = stack.enter_context(RobotSockets(EPHEMERAL, heartbeat_timeout_s=PATIENT_S))
-        operator = stack.enter_context(
-            OperatorSockets(robot.control_endpoint, heartbeat_timeout_s=PATIENT_S, connections=16)
-        )
-        peer = greet(robot, operator)
-        crowd = [stack.enter_context(closing(RawConnection(port_of(robot.control_endpoint)))) for _ in range(100)]
-        assert any(robot.crowded >= 90 for _ in range(ROUNDS) if robot.wait(0.01) or not robot.receive())
-        assert all(connection.ended() for connection in crowd[:90])
-        assert operator.send(b"still here", everywhere=True)
-        drain_all(lambda: [payload for _, payload in robot.receive()], robot.wait, [b"still here"] * 16)
-        assert robot.send(peer, b"and heard")
-
-
-# Peers that do not read
-
-
 def unsent_bytes(descriptor: int) -> int:
     """Return the number of bytes that the kernel holds for a connection and has not sent (SIOCOUTQNSD)."""
     return int(struct.unpack("i", fcntl.ioctl(descriptor, 0x894B, bytes(4)))[0])
-
-
-def held_back(end: RobotSockets) -> list[int]:
-    """Return the TCP_NOTSENT_LOWAT of all ends, in this process, of connections to the two ports, sorted."""
-    ports, marks = {port_of(end.control_endpoint), port_of(end.view_endpoint)}, []
-    for descriptor in Path("/proc/self/fd").iterdir():
-        try:
-            connection = socket.socket(socket.AF_INET, socket.SOCK_STREAM, fileno=int(descriptor.name))
-        except OSError:
-            continue
-        try:
-            if ports & {connection.getsockname()[1], connection.getpeername()[1]}:
-                marks.append(connection.getsockopt(socket.IPPROTO_TCP, socket.TCP_NOTSENT_LOWAT))
-        except (OSError, IndexError):
-            pass
-        finally:
-            connection.detach()
-    return sorted(marks)
-
-
-def test_the_kernel_holds_little_for_any_connection_of_either_side(
-    robot: RobotSockets, operator: OperatorSockets
-) -> None:
-    greet(robot, operator)
-    publish_until_seen(robot, operator, b"telemetry")
-    expected = 2 * CONNECTIONS * [CONTROL_UNSENT_BYTES] + 2 * [VIEW_UNSENT_BYTES]
-    for _ in range(ROUNDS):
-        robot.receive(), operator.receive()
-        if held_back(robot) == expected:
-            return
-        robot.wait(0.01)
-    assert held_back(robot) == expected
 
 
 def test_little_waits_for_a_peer_that_stops_reading_and_others_lose_nothing(

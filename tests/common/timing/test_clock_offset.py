@@ -28,9 +28,6 @@ def test_an_asymmetry_that_is_known_costs_nothing() -> None:
     assert abs(error_s(offset, clock, end_s)) < 0.1e-3
 
 
-# Shared clocks, and clocks that jump
-
-
 @pytest.mark.parametrize("jump_s", [-3600.0, -5.0, -0.150, 0.150, 5.0, 3600.0])
 def test_a_clock_that_jumps_is_followed_within_a_second(jump_s: float) -> None:
     generator, before, after = np.random.default_rng(23), ahead(70.0, 20e-6), ahead(70.0 + jump_s, 20e-6)
@@ -129,9 +126,6 @@ def test_a_route_that_gets_shorter_or_longer_is_no_jump(before_s: float, there_s
     end_s = talk(offset, clock, there_s + queues_s[0], back_s + queues_s[1], start_s=end_s)
     assert offset.jumps == 0
     assert abs(error_s(offset, clock, end_s)) < 0.5e-3
-
-
-# Wrong stamps
 
 
 @pytest.mark.parametrize(

@@ -12,8 +12,6 @@ _FIELD_PERIOD_S = 0.02
 
 
 class ArmlessRobot(ServingRobot):
-    """Robot side without an arm, which runs in a thread during the context."""
-
     def __init__(self) -> None:
         super().__init__(publishes=False, safety=SLOW_MACHINE)
         self.r2_stiffness = 0.0
@@ -25,12 +23,10 @@ class ArmlessRobot(ServingRobot):
 
     @property
     def flags(self) -> list[str]:
-        """Flags of an operator side that connect it to this robot side."""
         return [f"--connect={self.control}", f"--view-connect={self.view}"]
 
     @property
     def commands(self) -> int:
-        """Number of motion commands received."""
         return self.session.motion_received
 
     def tick(self, now_s: float) -> None:

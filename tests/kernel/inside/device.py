@@ -30,7 +30,6 @@ _EFFECTS: Final[tuple[tuple[Strengths, Strengths], ...]] = (
 
 @contextlib.contextmanager
 def our_device(plugged: Plugged) -> Iterator[HidDualSense]:
-    """Our driver, open on the virtual controller during the context."""
     hidraw = bound(plugged).hidraw()
     assert hidraw is not None
     device = HidDualSense(load_backend(), os.fsencode(hidraw))
@@ -41,7 +40,6 @@ def our_device(plugged: Plugged) -> Iterator[HidDualSense]:
 
 
 def newest_state(device: HidDualSense) -> ControllerState | None:
-    """Return the state by the newest input report; None if no report came."""
     return device.read(0.0)
 
 

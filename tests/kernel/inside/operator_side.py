@@ -33,7 +33,6 @@ class Desk:
         self.controller = "unknown"
 
     def note(self, part: str) -> None:
-        """Wait until the operator side has printed a note that contains `part`."""
 
         def said() -> bool:
             self._listen()
@@ -42,7 +41,6 @@ class Desk:
         wait_until(f"a note: {part}", said, instead=lambda: self.notes)
 
     def controller_lost(self) -> bool:
-        """Return whether the operator side's newest status reports a lost controller."""
         self._listen()
         return self.controller == "lost"
 
@@ -152,6 +150,5 @@ def test_killed_with_stiff_triggers_its_watchdog_releases_them(desk: Desk) -> No
 
 
 def released_and_stopped(desk: Desk) -> None:
-    """Wait until the triggers are free and the robot side is disarmed."""
     wait_until("the triggers are released", lambda: desk.plugged.ask(lambda controller: controller.released))
     wait_until("the robot stops", lambda: desk.robot.state == "disarmed" and not desk.robot.moving)

@@ -1,5 +1,3 @@
-"""Forces of a trigger: measured strength by strength, stored by the controller's address."""
-
 from pathlib import Path
 
 import pytest

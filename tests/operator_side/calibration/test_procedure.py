@@ -1,5 +1,3 @@
-"""Calibration of a controller: results for good measurements, and refusals of bad ones."""
-
 import math
 
 import pytest
@@ -8,18 +6,10 @@ from hypothesis import strategies as st
 
 from operator_side.calibration.procedure import CalibrationError, CalibrationProcedure, Step
 from operator_side.controller.state import ControllerState
-from operator_side.hands.travel_calibration import StickRest, TriggerTravel
 from tests.helpers.calibrating_hands import REPORT_S, Hands, Wear
 
 ENDS = st.tuples(st.floats(0.0, 0.2), st.floats(0.7, 1.0))
 PLACES = st.tuples(st.floats(-0.1, 0.1), st.floats(-0.1, 0.1))
-
-
-def test_a_new_controller() -> None:
-    result = Hands(Wear()).run().result
-    assert result is not None
-    assert result.l2 == result.r2 == TriggerTravel(0.03, 0.97)
-    assert result.left_stick == result.right_stick == StickRest(0.0, 0.0, 0.05)
 
 
 def test_a_worn_controller() -> None:

@@ -1,5 +1,3 @@
-"""Writes in a thread: the newest values are written, the caller never waits, and failures are reported."""
-
 import threading
 from collections.abc import Iterator
 

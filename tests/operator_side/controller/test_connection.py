@@ -1,5 +1,3 @@
-"""Connection to a controller that comes and goes, in virtual time: notes, searches, and no trigger left stiff."""
-
 from dataclasses import dataclass
 
 import pytest
@@ -25,8 +23,6 @@ STIFF = Feel(r2=feedback(3, 6))
 
 @dataclass
 class FakeDevice:
-    """Simulated device that the test can unplug."""
-
     log: list[str]
     plugged_in: bool = True
     released: bool = True
@@ -166,17 +162,6 @@ def test_the_watchdog_gets_the_hold_before_any_write_and_beats_while_an_effect_i
     assert world.log == ["rest", "beat", "write"]
 
 
-def test_after_a_silence_the_triggers_are_told_anew(world: World) -> None:
-    world.connected()
-    world.connection.write(STIFF, world.now_s)
-    world.run(1.0)
-    world.log.clear()
-    world.now_s += REWRITE_AFTER_S
-    world.run(PERIOD_S)
-    assert world.log == ["beat", "found"]
-    assert world.connection.found == 1
-
-
 @pytest.mark.parametrize("noticed_by", ["reading", "writing"])
 def test_unplugged_it_is_lost_at_once_and_looked_for_a_second_later(world: World, noticed_by: str) -> None:
     device = world.connected()
@@ -289,3 +274,14 @@ def test_closing_releases_or_leaves_it_to_the_watchdog(world: World, unplugged: 
     looks = len(world.search.looks)
     world.run(3.0)
     assert len(world.search.looks) == looks
+
+
+def test_after_a_silence_the_triggers_are_told_anew(world: World) -> None:
+    world.connected()
+    world.connection.write(STIFF, world.now_s)
+    world.run(1.0)
+    world.log.clear()
+    world.now_s += REWRITE_AFTER_S
+    world.run(PERIOD_S)
+    assert world.log == ["beat", "found"]
+    assert world.connection.found == 1

@@ -210,7 +210,6 @@ class VirtualWatchdog(ReleaseGuard):
         self._deadline_s = None
 
     def look(self) -> None:
-        """Release the controller if a beat is overdue."""
         if self._deadline_s is not None and self._system.clock.now() >= self._deadline_s:
             self.release()
 

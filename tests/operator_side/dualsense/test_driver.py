@@ -1,5 +1,3 @@
-"""Driver of a real DualSense, with a stand-in for hidapi."""
-
 import sys
 import types
 from collections.abc import Callable
@@ -34,9 +32,6 @@ STIFF = Feel(r2=feedback(3, 6))
 
 def open_fake(handle: FakeHandle) -> HidDualSense:
     return HidDualSense(FakeBackend({0x0CE6: {PATH: handle}}), PATH)
-
-
-# Opening
 
 
 @TRANSPORTS
@@ -109,9 +104,6 @@ def test_the_installed_hidapi_has_what_is_used() -> None:
     assert "No such file" in handle.error()
 
 
-# Reading
-
-
 @pytest.mark.parametrize(
     ("transport", "bad"),
     [
@@ -162,9 +154,6 @@ def test_a_report_is_new_while_number_time_or_hands_move_and_a_repetition_is_not
         assert device.read(0.0) is None
     handle.waiting = [made(600), made(601), made(601)]  # After a stall of ours.
     assert device.read(0.0) is not None
-
-
-# Writing
 
 
 @TRANSPORTS

@@ -1,5 +1,3 @@
-"""Choice of a controller among several, or among several paths to the same controller."""
-
 import threading
 
 import pytest
@@ -134,9 +132,6 @@ def test_the_rule_names_every_model_on_usb_and_bluetooth() -> None:
     assert len(RULES) == 4
 
 
-# The search in a thread
-
-
 class Looks:
     """Function `find` for a search, which waits until the test releases it."""
 
@@ -180,17 +175,6 @@ def test_a_look_waits_for_nobody_and_is_one_at_a_time() -> None:
     assert isinstance(finished(search, looks), NoDeviceError)
     assert looks.asked == ["aa"]
     assert search.take() is None
-
-
-def test_what_is_found_is_handed_over_once() -> None:
-    handle, find = usable()
-    looks = Looks(find(None))
-    search = BackgroundSearch(looks.find)
-    search.begin(None)
-    assert finished(search, looks) is looks.result
-    assert search.take() is None
-    search.close()
-    assert handle.closed == 0
 
 
 def test_what_else_goes_wrong_is_not_lost() -> None:

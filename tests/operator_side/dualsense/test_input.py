@@ -1,5 +1,3 @@
-"""Input and feature reports: every field on both transports, round trips, and one error for all other bytes."""
-
 import contextlib
 import zlib
 from typing import Any
@@ -147,9 +145,6 @@ def test_a_bluetooth_report_with_a_wrong_bit_is_refused(block: bytes, bit: int) 
     report[bit // 8] ^= 1 << bit % 8
     with pytest.raises(RemoteProtocolError, match="checksum" if bit >= 8 else "id 0x"):
         parse_input_report(bytes(report))
-
-
-# Features
 
 
 @TRANSPORTS

@@ -50,9 +50,6 @@ def framings(block: bytes) -> tuple[bytes, bytes, bytes]:
     )
 
 
-# Effects
-
-
 @pytest.mark.parametrize(
     ("effect", "expected"),
     [
@@ -96,9 +93,6 @@ def test_what_another_program_says_is_kept_as_it_is_and_holds_nothing(encoded: s
 def test_any_bytes_decode_to_what_encodes_to_them(encoded: bytes) -> None:
     strengths = decode_effect(encoded)
     assert strengths is None or encode_effect(strengths) == encoded
-
-
-# Reports
 
 
 @pytest.mark.parametrize(("transport", "sequence"), [(Transport.USB, 0), (Transport.BLUETOOTH, 11)])

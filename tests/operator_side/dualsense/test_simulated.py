@@ -1,5 +1,3 @@
-"""Simulated controller: mechanics of finger and trigger, timing of reports, and commands."""
-
 import math
 from typing import Any
 
@@ -10,7 +8,6 @@ from hypothesis import strategies as st
 from common.errors import DeviceError
 from operator_side.controller.feel import (
     FREE_TRIGGER,
-    SENSED_TRAVEL,
     USUAL_LIGHT,
     WARNING_LIGHT,
     Feel,
@@ -38,9 +35,6 @@ STIFF = Feel(l2=feedback(3, 6), r2=feedback(0, 8))
 NAN, INF = float("nan"), float("inf")
 
 
-# The finger
-
-
 def resistance_n(travel: float, strength: int) -> float:
     return SPRING_PRELOAD_N + SPRING_RISE_N * travel + STRENGTH_STEP_N * strength
 
@@ -60,13 +54,6 @@ def test_forces_balance_at_the_equilibrium(force_n: float, strengths: tuple[int,
         assert max(resistance_n(travel, strengths[zone]) for zone in beside) >= force_n - 1e-9
 
 
-def test_a_normal_pull_is_full_when_free_overcomes_the_strongest_and_rests_at_an_edge() -> None:
-    assert equilibrium_travel(NORMAL_FINGER_FORCE_N, (0,) * 10) >= SENSED_TRAVEL
-    assert 0.25 <= equilibrium_travel(NORMAL_FINGER_FORCE_N, (8,) * 10) <= 0.6 * SENSED_TRAVEL
-    strengths = (0,) * 5 + (8,) * 5
-    assert {equilibrium_travel(force_n, strengths) for force_n in (2.6, 3.0, 3.5, 4.4)} == {0.5}
-
-
 def test_relaxation_has_the_stated_time_constant() -> None:
     trigger = SimulatedTrigger()
     trigger.set_finger_force(NORMAL_FINGER_FORCE_N)
@@ -75,9 +62,6 @@ def test_relaxation_has_the_stated_time_constant() -> None:
     assert trigger.travel == pytest.approx(goal * (1.0 - math.exp(-1.0)), abs=1e-12)
     trigger.advance(1e6)
     assert trigger.travel == pytest.approx(goal)
-
-
-# Reports in time
 
 
 def report_at(device: SimulatedDualSense, now_s: float) -> bytes:
@@ -93,7 +77,6 @@ def state_at(device: SimulatedDualSense, now_s: float) -> ControllerState:
 
 
 def number_of(report: bytes) -> int:
-    """Return the sequence number in a USB report."""
     return report[7]
 
 
@@ -142,9 +125,6 @@ def test_how_often_it_is_read_does_not_matter(phases: list[tuple[float, tuple[in
         last = next((report for report in reversed(reports) if report is not None), None)
         assert coarse.read(tick * 0.0025) == last
         assert coarse.travel == pytest.approx(fine.travel, abs=1e-11)
-
-
-# Commands
 
 
 @TRANSPORTS
@@ -198,9 +178,6 @@ def test_close_releases_puts_a_changed_light_back_and_ends() -> None:
         device.read(0.1)
     with pytest.raises(DeviceError, match="closed"):
         device.write(Feel(), 0.1)
-
-
-# Refusals
 
 
 def used(what: str, *arguments: Any, **named: Any) -> Any:

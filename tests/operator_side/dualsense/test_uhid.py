@@ -1,5 +1,3 @@
-"""Controller offered through /dev/uhid: exact bytes of the protocol, the file, and the loop."""
-
 import os
 import struct
 from collections import deque
@@ -19,9 +17,6 @@ from tests.helpers.fake_kernel import START, FakeKernel, PlainController, get_re
 CREATE2, DESTROY, INPUT2, GET_REPORT_REPLY = 11, 1, 12, 10
 ANSWER = bytes.fromhex("0a000000 01000000 0000 0300 050102")
 FIRST_INPUT = bytes.fromhex("0c000000 0200 0102")
-
-
-# The protocol
 
 
 @pytest.mark.parametrize(("model", "product_id"), [(Model.DUALSENSE, 0x0CE6), (Model.EDGE, 0x0DF2)])
@@ -78,9 +73,6 @@ def test_refusals() -> None:
         UhidIdentity(unique_id="x" * 64)
 
 
-# The loop
-
-
 def lived(kernel: FakeKernel, until_s: float) -> list[float]:
     """Offer a controller until `until_s`; return the times at which the loop asked whether to continue."""
     asked: list[float] = []
@@ -130,9 +122,6 @@ def test_it_is_unplugged_when_the_loop_fails() -> None:
     with pytest.raises(KeyError):
         offer(kernel, UhidController(PlainController(), UhidIdentity()), kernel.clock, 0.004, fails)
     assert [event[0] for _, event in kernel.heard] == [CREATE2, DESTROY]
-
-
-# The file
 
 
 def test_the_file_reads_and_writes_without_waiting_and_quotes_a_refusal(

@@ -110,7 +110,6 @@ class FakeNode:
         self._theirs.sendall(b"".join(EVENT.pack(0, 0, *event) for event in events))
 
     def plays(self) -> list[tuple[int, int]]:
-        """Return the effects (id, count) that were played since the last call."""
         try:
             content = self._theirs.recv(65536)
         except BlockingIOError:

@@ -157,19 +157,6 @@ def test_without_an_echo_that_history_reaches_back_to_there_is_no_answer(
     assert commands.displacement(5.0, Report(3.0, 0.0, 0.1, FULL_M_S), 3.0) is not None
 
 
-def test_there_is_no_answer_from_before_the_first_command() -> None:
-    commands = CommandsUnderWay()
-    report = Report(0.9, 0.0, 0.0, FULL_M_S)
-    assert commands.displacement(1.0, report, 3.0) is None
-    commands.sent(0.95, 0.0)
-    assert commands.displacement(1.0, report, 3.0) is None
-    assert displacement(commands, 1.0, 0.95) == Displacement(0.0, 0.0)
-
-
-def test_a_held_that_drifting_clocks_make_too_long_is_now() -> None:
-    assert displacement(sent_every([1.0]), 0.1, 0.0, 0.1005, 0.2) == Displacement(0.0, 0.2)
-
-
 def test_memory_is_bounded_whatever_the_rate() -> None:
     commands = CommandsUnderWay()
     for tick in range(10_000):

@@ -1,5 +1,3 @@
-"""Path ahead: objects where the sticks lead are felt before the robot side has received the sticks' commands."""
-
 from typing import Any
 
 import msgspec
@@ -37,7 +35,6 @@ HORIZON_M = 0.4
 
 
 def around(near: dict[int, float], *, advancing: bool = True) -> Around:
-    """Return a map that is free, except for these probes with their contact distances."""
     onsets_m = np.full((LISTS, PROBES), np.inf)
     for probe, displacement_m in near.items():
         onsets_m[slice(0, 2) if advancing else slice(2, 4), probe] = displacement_m
@@ -65,14 +62,6 @@ def first_zone(
     return sum(strength < 8 for strength in strengths)
 
 
-def test_sticks_that_rest_are_not_traced() -> None:
-    assert under_way(0.4, AT_REST).course(0.4, REPORT, CHANGES_S) is None
-    # A stick that has just come to rest is still under way.
-    commands = under_way(0.4, RIGHT)
-    commands.sent(0.404, 0.5, AT_REST)
-    assert commands.course(0.41, REPORT, CHANGES_S) is not None
-
-
 @pytest.mark.parametrize("forth", [True, False])
 def test_what_stands_where_the_stick_leads_makes_the_zones_full_that_get_so_far(forth: bool) -> None:
     """With 0.4 s of commands under way, the stick leads beyond the probe at two thirds and to the outermost one."""
@@ -86,36 +75,6 @@ def test_what_stands_where_the_stick_leads_makes_the_zones_full_that_get_so_far(
     for elsewhere in ((-1.0, 0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0)):
         assert first_zone(commanded, elsewhere, forth=forth) == ZONE_COUNT
     assert first_zone(commanded, RIGHT, forth=not forth) == ZONE_COUNT
-
-
-def test_it_does_not_count_that_the_stick_does_not_reach() -> None:
-    commanded = around({RIGHT_ACROSS[2]: 0.0})
-    assert first_zone(commanded, RIGHT, now_s=0.0) == ZONE_COUNT
-    assert first_zone(commanded, RIGHT, now_s=0.5) < ZONE_COUNT
-    slowly = (0.3, 0.0, 0.0, 0.0)
-    assert first_zone(commanded, slowly, now_s=0.5) == ZONE_COUNT
-
-
-def test_what_is_under_way_along_the_trigger_counts() -> None:
-    commanded = around(dict.fromkeys((*RIGHT_ACROSS, 0), 0.09))
-    assert first_zone(commanded, RIGHT, travel=0.0) > first_zone(commanded, RIGHT, travel=1.0)
-
-
-def test_what_lies_straight_ahead_of_a_turn_or_a_drift_is_not_met() -> None:
-    commanded = around({0: 0.01})
-    assert first_zone(commanded, AT_REST) == ZONE_COUNT  # not traced
-    for sticks in (RIGHT, (0.0, 0.0, 1.0, 0.0)):
-        assert first_zone(commanded, sticks) == ZONE_COUNT
-        # A stick that was deflected just now has not reached the object yet.
-        assert first_zone(commanded, sticks, now_s=0.0) < ZONE_COUNT
-
-
-def test_a_stick_that_is_let_go_now_leads_to_what_it_would_have_passed() -> None:
-    """The stick was deflected just now, and the object is at the gripper's position: a stick released now meets it."""
-    commanded = around({0: 0.05})
-    assert first_zone(commanded, RIGHT, now_s=0.012) < ZONE_COUNT
-    # After two thirds of the distance to the first probe the stick has led past the object.
-    assert first_zone(commanded, RIGHT, now_s=0.2) == ZONE_COUNT
 
 
 def test_strength_rises_before_full_as_it_does_straight_ahead_and_no_farther() -> None:
@@ -187,9 +146,6 @@ def test_ways_ahead_are_those_of_the_arms_model(speed: float, was: float, stick:
         np.testing.assert_allclose(aside_s[0, k], passed[1:], atol=1e-9)
 
 
-# Within everything that is rendered
-
-
 def message(sent_s: float, commanded: Around | None, epoch: int = 1, **changes: Any) -> StiffnessUpdate:
     header = Header(epoch, round(1e3 * sent_s), sent_s, echo_sent_s=0.0, echo_held_s=0.0)
     update = StiffnessUpdate(header, FIELD, FIELD, 0.0, FAR_M, 0.0, "armed", around=commanded)
@@ -222,12 +178,6 @@ def test_the_newest_map_holds_until_it_is_old_or_another_robot_side_speaks() -> 
         assert report is not None
         assert report.r2 is not None
         assert report.r2[-1] < 8
-
-
-def test_without_a_map_or_where_the_robot_side_reckons_nothing_is_traced() -> None:
-    assert strengths(haptics(), message(0.3, None)) == (0,) * ZONE_COUNT
-    commanded = around(dict.fromkeys((*RIGHT_ACROSS, 0), 0.03))
-    assert strengths(haptics("robot"), message(0.3, commanded)) == (0,) * ZONE_COUNT
 
 
 def test_a_path_is_traced_once_for_each_write_and_at_once_for_a_new_map() -> None:

@@ -1,5 +1,3 @@
-"""Rendering of stiffness fields over time: strengths of both triggers' zones, and the motors."""
-
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -98,16 +96,6 @@ def test_after_any_past_it_is_never_weaker_than_asked_for_and_soon_no_stronger(
     assert rendered(last, trigger, now_s + 0.1 + 1e-9) == (last,) * 10
 
 
-def test_the_free_travel_is_the_way_that_is_left() -> None:
-    free = []
-    for left_m in (0.12, 0.06, 0.03, 0.01, 0.001):
-        rendering = TriggerRendering(USUAL, TravelCalibration())
-        ahead = field(onsets(left_m))
-        free.append(zones(rendering.render(update(uniform_field(0), ahead), LET_GO, STILL, 0.0))[1].count(0))
-    # The zone that commands 0.184 m/s, the sixth, needs 0.3 * 0.184 + 0.184²/6 = 61 mm.
-    assert free == [10, 5, 3, 1, 0]
-
-
 def test_each_trigger_gets_its_own_zones_with_the_displacement_and_the_other_triggers_pull() -> None:
     def shown(moving: Displacement | None, pulled: tuple[float, float] = LET_GO) -> tuple[tuple[int, ...], ...]:
         return zones(TriggerRendering(USUAL, TravelCalibration()).render(update(PARTED, PARTED), pulled, moving, 0.0))
@@ -128,15 +116,6 @@ def test_with_swapped_sides_each_gets_the_others() -> None:
     assert swapped.r2 is not None
     assert swapped.r2[-1] == 1
     assert swapped.r2[0] == 0  # It retreats only once it is pulled farther than the advancing trigger.
-
-
-def test_another_reaction_time_is_another_free_travel() -> None:
-    shown = []
-    for horizon_s in (0.0, 0.3, 0.6):
-        rendering = TriggerRendering(RenderingSettings(horizon_s), TravelCalibration())
-        shown.append(zones(rendering.render(update(PARTED, PARTED), LET_GO, STILL, 0.0))[1].count(0))
-    assert shown == sorted(shown, reverse=True)
-    assert len(set(shown)) == 3
 
 
 def test_the_run_says_which_zones_were_stiff_and_how_many_for_want_of_knowing() -> None:

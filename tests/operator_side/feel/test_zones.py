@@ -41,21 +41,6 @@ def test_the_middles_of_the_zones_are_of_the_mechanical_travel() -> None:
     assert zone_travels(TriggerTravel(0.2, 0.5))[:5] == pytest.approx((0.0, 0.0, 4 / 9, 8 / 9, 1.0))
 
 
-def test_an_example_worked_out_by_hand() -> None:
-    ahead = field(
-        onsets(0.03, 0.045, 0.05, 0.06, 0.07, 0.08, 0.09, 0.12),
-        onsets(0.02, 0.2),
-        full_speed_m_s=0.3,
-        acceleration_m_s2=3.0,
-    )
-    # u = 0.02, 0.06, 0.10 .. 0.30 m/s; D = 0.01 + 0.3 u + u²/6 + max(0, 0.2 - u)²/6
-    #   = 21.5, 31.9, 43.3, 55.9, 69.5, 84.1, 99.3, 115, 115, 115 mm; below 45 mm/s with the slow list.
-    zones = zone_strengths(ahead, 0.2, zone_travels(TriggerTravel(0.0, 1.0)), 0.0, Displacement(0.01, 0.2), 0.3)
-    assert zones == ((1, 1, 1, 3, 4, 6, 7, 7, 7, 7), 0)
-    zones = zone_strengths(ahead, 0.11, zone_travels(TriggerTravel(0.0, 1.0)), 0.0, Displacement(0.01, 0.2), 0.3)
-    assert zones == ((1, 1, 1, 3, 4, 6, 7, 8, 8, 8), 3)
-
-
 def one_by_one(ahead: TriggerField, travels: tuple[float, ...], other: float, moving: Displacement) -> list[int]:
     """Compute each zone's strength directly by the equation of D_z."""
     full, strengths = ahead.full_speed_m_s, [0]

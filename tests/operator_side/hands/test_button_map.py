@@ -1,5 +1,3 @@
-"""Button map: the document agrees with it."""
-
 import pytest
 
 from operator_side.hands.button_map import Action, button_of

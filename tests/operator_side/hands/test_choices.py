@@ -1,5 +1,3 @@
-"""Choices of the driver: a press counts once, and takes effect once triggers and sticks are at rest."""
-
 import math
 
 import pytest

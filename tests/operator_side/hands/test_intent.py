@@ -1,5 +1,3 @@
-"""Operator's intent from a controller's state, by calibration and button map."""
-
 import pytest
 
 from operator_side.controller.state import Button, ControllerState

@@ -1,5 +1,3 @@
-"""Calibrated travel and deflection: dead zones, saturation, sticks that rest off centre."""
-
 import math
 
 import pytest

@@ -1,5 +1,3 @@
-"""Sending of commands: the robot side's held command differs from the intent by at most 0.01."""
-
 from dataclasses import replace
 from itertools import pairwise
 from typing import Any

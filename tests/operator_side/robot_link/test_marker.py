@@ -1,5 +1,3 @@
-"""Marks of episodes: each press counts once, and is sent until the robot side has answered it."""
-
 import msgspec
 import pytest
 
@@ -17,8 +15,6 @@ PERIOD_S = 0.02
 
 
 class Heard(Listener):
-    """Listener that keeps the marks that count."""
-
     def __init__(self) -> None:
         self.marks: list[object] = []
 
@@ -45,7 +41,6 @@ class Desk(Bench):
         )
 
     def marks(self, for_s: float, *buttons: Button) -> list[tuple[int, EpisodeMark]]:
-        """Hold the buttons for `for_s`; return the marks sent meanwhile."""
         sent = []
         for _ in range(round(for_s / PERIOD_S)):
             self.now_s += PERIOD_S

@@ -1,5 +1,3 @@
-"""Views at the operator side: facts of the core, figures of the scene, and what console and status get."""
-
 import math
 from collections import deque
 from typing import cast
@@ -168,12 +166,6 @@ class Looking:
                 self.viewing.show(self.bench.side.status(self.bench.now_s), self.bench.now_s)
         assert all(isinstance(watch, Watch) for watch in asked)
         return cast(list[Watch], asked)
-
-
-def test_nothing_is_asked_for_and_nothing_made_while_nobody_looks() -> None:
-    looking = Looking()
-    assert looking.turns(2.0) == []
-    assert looking.console.shown == []
 
 
 def test_four_times_a_second_it_is_asked_for_and_thirty_times_shown() -> None:

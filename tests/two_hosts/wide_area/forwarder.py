@@ -41,8 +41,6 @@ _IN_A_ROW: Final = 64
 
 
 class Order(msgspec.Struct, frozen=True):
-    """Order to the forwarder, which starts it."""
-
     ways: dict[Direction, DirectionSettings]
     """Settings of directions; a direction without settings does nothing to packets"""
     control: str | None = None
@@ -155,7 +153,6 @@ class _Forwarder:
                 self._failed += 1
 
     def _counts(self) -> dict[str, Any]:
-        """Return the counts since the last call."""
         now_s = time.monotonic()
         late_ms = 1e3 * np.array(self._late_s or [0.0])
         figures: dict[str, Any] = {

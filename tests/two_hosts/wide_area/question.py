@@ -59,13 +59,11 @@ _VARIED: Final = tuple(one.name for one in fields(Trial) if one.name != "seconds
 
 
 def cells(settings: WideSweep) -> Iterator[Trial]:
-    """Yield a trial for each combination of the values."""
     for chosen in product(*(getattr(settings, name) for name in _VARIED)):
         yield Trial(**dict(zip(_VARIED, chosen, strict=True)), seconds=settings.seconds)
 
 
 def run(cell: Trial, seed: int) -> Iterator[Row]:
-    """Run one trial; yield its figures."""
     yield run_trial(cell, seed)
 
 

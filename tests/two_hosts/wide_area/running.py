@@ -40,8 +40,6 @@ def run_trial(trial: Trial, seed: int = 0) -> Row:
 
 @dataclass
 class _Sides:
-    """Processes of a trial, and what their statuses say."""
-
     stack: contextlib.ExitStack
     wide: WideArea
     trial: Trial
@@ -86,7 +84,6 @@ class _Sides:
         return self.stack.enter_context(self.wide.run(host, *words))
 
     def watch(self) -> Mapping[str, Any]:
-        """Wait for the run's time; return the forwarder's counts."""
         trial = self.trial
         began_s = time.monotonic()
         for of_all in (1 / 3, 1.0):

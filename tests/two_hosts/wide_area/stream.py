@@ -53,8 +53,6 @@ class StreamSweep(Sweep):
 
 @dataclass(frozen=True)
 class Cell(Limited):
-    """One link, and what carries the messages."""
-
     delay: Annotated[float, Meta(ge=0.0, le=5000.0)]
     loss: Annotated[float, Meta(ge=0.0, le=100.0)]
     hz: Annotated[float, Meta(ge=1.0, le=1e4)]

@@ -68,7 +68,6 @@ class Child:
         return self.hear()
 
     def end(self) -> None:
-        """End the process, by force if necessary."""
         assert self._process.stdin is not None
         assert self._process.stdout is not None
         self._process.stdin.close()
@@ -100,11 +99,9 @@ class WideArea(Child):
         return ["ip", "netns", "exec", self._namespaces[host], "env", f"PYTHONPATH={ROOT}"]
 
     def run(self, host: Host, module: str, *arguments: str) -> Child:
-        """Start one of this package's programs on `host`."""
         return Child(module, *arguments, before=self.surroundings(host))
 
     def figures(self) -> dict[str, Any]:
-        """Return the forwarder's counts since the last call."""
         self.say("")
         return self.hear()
 

@@ -1,5 +1,3 @@
-"""Gate of the console: requests without the token, from another site or for another host are refused."""
-
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st

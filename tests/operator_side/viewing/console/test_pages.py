@@ -1,5 +1,3 @@
-"""Pages over real WebSockets in one process: their messages, their limits, and their number."""
-
 import asyncio
 import contextlib
 from collections.abc import AsyncIterator, Awaitable, Callable
@@ -19,8 +17,6 @@ Opens = Callable[[], contextlib.AbstractAsyncContextManager[ClientConnection]]
 
 
 class Desk:
-    """Pages, and the callbacks that they made."""
-
     def __init__(self) -> None:
         self.counts: list[int] = []
         self.heard: list[tuple[str, Any]] = []
@@ -52,7 +48,6 @@ def run(story: Callable[[Desk, Opens], Awaitable[None]]) -> Desk:
 
 
 async def a_round(page: ClientConnection) -> list[str | bytes]:
-    """Return all messages until the end of the batch."""
     messages: list[str | bytes] = []
     while (message := await page.recv()) != ROUND_ENDS:
         messages.append(message)

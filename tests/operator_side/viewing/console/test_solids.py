@@ -1,5 +1,3 @@
-"""Meshes of the shapes: closed, facing outwards, and of the right volume."""
-
 import math
 
 import numpy as np

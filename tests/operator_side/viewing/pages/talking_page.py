@@ -20,7 +20,6 @@ class TalkingPage:
         self.number = 0
 
     def content(self, **hands: Any) -> dict[str, Any]:
-        """Return the page's next message, as decoded from JSON."""
         self.number += 1
         return {"hands": {"page": self.word, "number": self.number, "driving": True} | hands}
 

@@ -1,5 +1,3 @@
-"""Page as a controller, and whose inputs count: the scripted person's, the page's, or nobody's."""
-
 from itertools import pairwise
 from typing import Any
 
@@ -29,8 +27,6 @@ WORN = TravelCalibration(
 
 
 class Desk:
-    """Page, controller, and telemetry that the test sets."""
-
     def __init__(self, *, swap_sides: bool = False, person: bool = False):
         self.swap_sides = swap_sides
         self.device = SimulatedDualSense()

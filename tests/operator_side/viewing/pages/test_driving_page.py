@@ -1,5 +1,3 @@
-"""Choice of the driving page, and when its inputs count: by examples, and for any messages and silences."""
-
 import math
 from dataclasses import dataclass
 from itertools import pairwise
@@ -161,8 +159,6 @@ def test_the_person_goes_on_only_by_the_page_that_drives_or_any_when_none_does(p
 
 @dataclass(frozen=True)
 class Heard:
-    """Message of a page, with its time of arrival."""
-
     now_s: float
     page: int
     hands: PageHands

@@ -1,5 +1,3 @@
-"""Old and dead pictures, and the hands that fade with them, in virtual time."""
-
 from collections.abc import Callable
 from itertools import pairwise
 from typing import Any
@@ -43,7 +41,6 @@ class Watched:
         return self.bench.now_s - self.start_s
 
     def let_pass(self, for_s: float) -> list[float]:
-        """Return the share of the hands after each tick."""
         shares, bench = [], self.bench
         for _ in range(round(for_s / TICK_S)):
             bench.now_s += TICK_S

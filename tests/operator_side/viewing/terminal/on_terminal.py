@@ -46,7 +46,6 @@ class OnTerminal:
                 self.seen += os.read(self.ours, 1 << 16)
 
     def end(self) -> int:
-        """Send Ctrl-C and read all output; return the command's exit code."""
         self.process.send_signal(signal.SIGINT)
         self.read_until(lambda _: self.process.poll() is not None)
         while select.select([self.ours], [], [], 0.0)[0]:
@@ -54,6 +53,5 @@ class OnTerminal:
         return int(self.process.returncode)
 
     def is_put_back(self) -> bool:
-        """Return whether the terminal is as before: normal screen, cursor and input modes."""
         after = self.seen.rpartition(ENTERED)[2]
         return LEFT in after and b"\x1b[?25h" in after and termios.tcgetattr(self.ours) == self.before

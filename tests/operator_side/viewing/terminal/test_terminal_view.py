@@ -1,5 +1,3 @@
-"""Terminal view: content of the screen, and restoration of the terminal however the program ends."""
-
 import io
 import os
 import signal
@@ -130,18 +128,6 @@ def test_a_kill_puts_the_terminal_back(player: OnTerminal, whose: str) -> None:
     if whose == "its own":
         assert player.process.poll() is None
         assert player.end() == 0
-
-
-@pytest.mark.processes
-@pytest.mark.parametrize("player", [("--fast",)], indirect=True)
-def test_a_terminal_that_stalls_holds_nobody_up(player: OnTerminal) -> None:
-    assert player.process.stderr is not None
-    player.read_until(lambda seen: b"ARMED" in seen)
-    termios.tcflow(player.theirs, termios.TCOOFF)
-    assert [player.process.stderr.readline() for _ in range(2)][1] == "sent\n"
-    termios.tcflow(player.theirs, termios.TCOON)
-    assert player.end() == 0
-    assert player.is_put_back()
 
 
 def test_what_is_no_terminal_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
