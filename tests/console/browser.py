@@ -46,12 +46,11 @@ class Browser:
         *,
         scene: bool = False,
         gamepad: bool = False,
-        script: str = "",
     ) -> Iterator["Page"]:
         """Yield a page that shows `address` in a window of `size`; at the end, fail if the page had any error.
 
         scene: leave the scene drawn, which takes most of a core without a graphics processor. gamepad: let
-        `Page.pretend_gamepad` work. script: JavaScript that runs before the page's own.
+        `Page.pretend_gamepad` work.
         """
         context = self._chromium.new_context(viewport={"width": size[0], "height": size[1]})
         context.set_default_timeout(_LIMIT_MS)
@@ -59,7 +58,7 @@ class Browser:
 
         try:
             opened = context.new_page()
-            opened.add_init_script(script + (_FAKE_GAMEPAD if gamepad else ""))
+            opened.add_init_script(_FAKE_GAMEPAD if gamepad else "")
             page = Page(opened, self._out)
             opened.goto(address)
             if (button := opened.query_selector(_DRAWS_SCENE.format("false" if scene else "true"))) is not None:

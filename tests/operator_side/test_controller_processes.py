@@ -7,14 +7,31 @@ from pathlib import Path
 
 import pytest
 
+from common.protocol.codec import encode
+from common.protocol.messages import MotionState
 from operator_side.controller.feel import FREE_TRIGGER, RELEASED, Feel
 from operator_side.dualsense.reports.output_report import parse_output_report
+from tests.helpers.felt import felt
 from tests.helpers.machines.waiting import LIMIT_S, wait_until
 from tests.helpers.python_process import start
-from tests.operator_side.stiffness_source import StiffnessSource
+from tests.helpers.serving_robot import ServingRobot
 
 pytestmark = pytest.mark.processes
 REPORT_LENGTH = 48
+
+
+class StiffnessSource(ServingRobot):
+    """Robot side that grants the lease, and sends it stiffness unless it is silent."""
+
+    def __init__(self) -> None:
+        super().__init__(publishes=False)
+        self.state: MotionState = "disarmed"
+        self.silent = False
+
+    def tick(self, now_s: float) -> None:
+        self.session.update(now_s)
+        for owner in () if self.silent else self.session.owners(now_s):
+            self.sockets.send(owner.peer, encode(felt(owner.header, r2=7, state=self.state)))
 
 
 class World:
@@ -25,7 +42,6 @@ class World:
         self._controller = os.open(folder / "hidraw3", os.O_RDWR | os.O_NONBLOCK)
         (folder / "plugged").touch()
         self.source = StiffnessSource()
-        self.source.state = "disarmed"
         self.source.__enter__()
         ports = (f"--connect={self.source.control}", f"--view-connect={self.source.view}")
         self.process = start("tests/helpers/plugged_operator.py", str(folder), *ports, "--status=none")
@@ -41,7 +57,7 @@ class World:
 
     def stiffen(self) -> None:
         self.until("commands", lambda: bool(self.source.payloads and self.written))
-        self.source.state, self.source.r2 = "armed", 7
+        self.source.state = "armed"
         self.until("stiff", self.is_stiff)
 
     def is_stiff(self) -> bool:

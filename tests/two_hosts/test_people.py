@@ -1,6 +1,5 @@
 """A second operator; and sides that are killed, started in the other order, or get another wall-clock time."""
 
-import json
 import time
 
 import pytest
@@ -12,10 +11,9 @@ pytestmark = [pytest.mark.two_hosts, pytest.mark.processes]
 _REFUSED = "does not let this key in"
 
 
-def test_a_second_operator_watches_until_revoked_and_an_unknown_key_gets_nothing(lan: Lan) -> None:
-    bob, eve = lan.operator_host.user("bob"), lan.operator_host.user("eve")
-    for one in (bob, eve):
-        one.run("feelahead keys make operator")
+def test_a_second_operator_watches_until_revoked(lan: Lan) -> None:
+    bob = lan.operator_host.user("bob")
+    bob.run("feelahead keys make operator")
     lan.robot_host.run(f"feelahead keys allow bob {bob.run('feelahead keys show operator').strip()}")
     lan.moving()
     # The same person as at the other controller: they try to arm and to drive.
@@ -31,12 +29,6 @@ def test_a_second_operator_watches_until_revoked_and_an_unknown_key_gets_nothing
     lan.until("robot", "no observer", lambda status: status["observers"] == 0)
     print(f"out {time.monotonic() - began_s:.1f} s after the revocation")
     lan.end("bob")
-    summary = eve.home / "summary.json"
-    eves = lan.start("operator", eve, f"--summary={summary}", called="eve")
-    lan.until("eve", "refused", lambda status: _REFUSED in str(status["link_reason"]))
-    lan.end("eve")
-    assert json.loads(summary.read_text(encoding="utf-8"))["messages"]["stiffness_received"] == 0
-    assert not any("target" in status for status in eves.said)
     lan.until("robot", "anna's link", lambda status: status["link"] == "up")
 
 

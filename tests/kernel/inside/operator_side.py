@@ -11,7 +11,7 @@ from feelahead.both_sides.processes import SideProcess
 from operator_side.controller.state import Button
 from operator_side.dualsense.reports.transport import Transport
 from operator_side.dualsense.simulated.trigger_model import NORMAL_FINGER_FORCE_N
-from tests.helpers.machines.waiting import LIMIT_S, stays, wait_until
+from tests.helpers.machines.waiting import stays, wait_until
 from tests.kernel.inside.armless_robot import ArmlessRobot
 from tests.kernel.inside.plugged import Plugged, Variant
 
@@ -133,22 +133,12 @@ def test_gone_in_mid_run_the_robot_stops_and_stays_disarmed(desk: Desk, dongle: 
     stays("the robot moves again by itself", lambda: robot.state == "disarmed" and not robot.moving)
 
 
-def test_stopped_with_stiff_triggers_its_watchdog_releases_them(desk: Desk) -> None:
+@pytest.mark.parametrize("ends", [signal.SIGSTOP, signal.SIGKILL], ids=["hanging", "killed"])
+def test_its_watchdog_releases_stiff_triggers(desk: Desk, ends: signal.Signals) -> None:
     arm_and_pull(desk)
-    os.kill(desk.operator.process_id, signal.SIGSTOP)
+    os.kill(desk.operator.process_id, ends)
     try:
-        released_and_stopped(desk)
+        wait_until("the triggers are released", lambda: desk.plugged.ask(lambda controller: controller.released))
+        wait_until("the robot stops", lambda: desk.robot.state == "disarmed" and not desk.robot.moving)
     finally:
         os.kill(desk.operator.process_id, signal.SIGCONT)
-
-
-def test_killed_with_stiff_triggers_its_watchdog_releases_them(desk: Desk) -> None:
-    arm_and_pull(desk)
-    os.kill(desk.operator.process_id, signal.SIGKILL)
-    assert desk.operator.wait(LIMIT_S) == -signal.SIGKILL
-    released_and_stopped(desk)
-
-
-def released_and_stopped(desk: Desk) -> None:
-    wait_until("the triggers are released", lambda: desk.plugged.ask(lambda controller: controller.released))
-    wait_until("the robot stops", lambda: desk.robot.state == "disarmed" and not desk.robot.moving)

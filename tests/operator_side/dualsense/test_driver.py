@@ -91,19 +91,6 @@ def test_another_package_of_that_name(monkeypatch: pytest.MonkeyPatch) -> None:
         load_backend()
 
 
-def test_the_installed_hidapi_has_what_is_used() -> None:
-    hidraw = pytest.importorskip("hidraw")
-    backend = load_backend()
-    assert backend is hidraw
-    handle = backend.device()
-    for name in ("open_path", "set_nonblocking", "read", "write", "get_feature_report", "close", "error"):
-        assert callable(getattr(handle, name))
-    assert backend.enumerate(0x054C, 0xFFFF) == []
-    with pytest.raises(OSError, match="open failed"):
-        handle.open_path(b"/dev/no-such-hidraw")
-    assert "No such file" in handle.error()
-
-
 @pytest.mark.parametrize(
     ("transport", "bad"),
     [

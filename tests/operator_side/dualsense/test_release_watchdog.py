@@ -12,7 +12,7 @@ import pytest
 import operator_side.dualsense.hid.release_guard
 from operator_side.dualsense.hid.release_guard import MOST_REPLACEMENTS, ReleaseGuard
 from operator_side.dualsense.hid.release_watchdog import SILENCE_S, Target, Watch
-from tests.helpers.machines.waiting import LIMIT_S
+from tests.helpers.machines.waiting import LIMIT_S, stays, wait_until
 
 pytestmark = pytest.mark.processes
 REPORT = bytes(range(48))
@@ -141,15 +141,13 @@ def test_the_path_may_become_another_device_s(guard: ReleaseGuard, controller: F
 
 
 def wait_until_open(process_id: int, path: bytes) -> None:
-    with select.epoll() as pause:
-        for _ in range(round(LIMIT_S / 0.01)):
-            files = Path(f"/proc/{process_id}/fd").iterdir()
-            # While it starts, the process opens and closes other files.
-            with contextlib.suppress(FileNotFoundError):
-                if any(os.fsencode(file.readlink()) == path for file in files):
-                    return
-            pause.poll(0.01)
-    raise AssertionError(f"{path!r} was never opened")
+    def is_open() -> bool:
+        # While it starts, the process opens and closes other files.
+        with contextlib.suppress(FileNotFoundError):
+            return any(os.fsencode(file.readlink()) == path for file in Path(f"/proc/{process_id}/fd").iterdir())
+        return False
+
+    wait_until(f"{path!r} is open", is_open)
 
 
 def end_watchdog(guard: ReleaseGuard) -> None:
@@ -187,16 +185,9 @@ def test_watchdogs_that_end_again_and_again_are_given_up(guard: ReleaseGuard, co
 
 def test_a_controller_that_the_watchdog_cannot_open_is_told_of_once(guard: ReleaseGuard, tmp_path: Path) -> None:
     guard.hold(os.fsencode(tmp_path / "nothing"), REPORT)
-    notes: list[str] = []
-    with select.epoll() as pause:
-        for _ in range(round(LIMIT_S / 0.01)):
-            notes += guard.take_notes()
-            if notes:
-                break
-            pause.poll(0.01)
-        pause.poll(0.2)
-    [note] = notes + guard.take_notes()
+    [note] = wait_until("a note", lambda: guard.take_notes() or None)
     assert "cannot open the controller" in note
+    stays("said again", lambda: guard.take_notes() == [], 0.2)
 
 
 def test_a_controller_that_refuses_is_tried_a_few_times() -> None:

@@ -1,4 +1,3 @@
-import math
 from typing import Any
 
 import pytest
@@ -18,8 +17,6 @@ from operator_side.dualsense.reports.output_report import build_output_report
 from operator_side.dualsense.reports.transport import Transport
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.dualsense.simulated.trigger_model import (
-    FINGER_TIME_CONSTANT_S,
-    NORMAL_FINGER_FORCE_N,
     SPRING_PRELOAD_N,
     SPRING_RISE_N,
     STRENGTH_STEP_N,
@@ -52,16 +49,6 @@ def test_forces_balance_at_the_equilibrium(force_n: float, strengths: tuple[int,
         # At a boundary between zones, rounding decides which zone stops the finger.
         beside = {min(max(int(travel * 10 + one), 0), 9) for one in (-1e-9, 1e-9)}
         assert max(resistance_n(travel, strengths[zone]) for zone in beside) >= force_n - 1e-9
-
-
-def test_relaxation_has_the_stated_time_constant() -> None:
-    trigger = SimulatedTrigger()
-    trigger.set_finger_force(NORMAL_FINGER_FORCE_N)
-    trigger.advance(FINGER_TIME_CONSTANT_S)
-    goal = equilibrium_travel(NORMAL_FINGER_FORCE_N, (0,) * 10)
-    assert trigger.travel == pytest.approx(goal * (1.0 - math.exp(-1.0)), abs=1e-12)
-    trigger.advance(1e6)
-    assert trigger.travel == pytest.approx(goal)
 
 
 def report_at(device: SimulatedDualSense, now_s: float) -> bytes:
@@ -125,27 +112,6 @@ def test_how_often_it_is_read_does_not_matter(phases: list[tuple[float, tuple[in
         last = next((report for report in reversed(reports) if report is not None), None)
         assert coarse.read(tick * 0.0025) == last
         assert coarse.travel == pytest.approx(fine.travel, abs=1e-11)
-
-
-@TRANSPORTS
-def test_output_reports_change_only_what_they_set(transport: Transport) -> None:
-    """A `Feel` and the output report that it is encoded in have the same effect."""
-    by_value, by_wire = SimulatedDualSense(transport), SimulatedDualSense(transport)
-    third = (0, 0, 3, 0, 0, 0, 0, 0, 0, 0)
-    for number, (output, l2, r2) in enumerate(
-        (
-            (Feel(l2=feedback(3, 6), rumble=Rumble(1.0, 0.2)), feedback(3, 6), FREE_TRIGGER),
-            (Feel(r2=third, light=(1, 2, 3)), feedback(3, 6), third),
-            (Feel(l2=FREE_TRIGGER, r2=FREE_TRIGGER), FREE_TRIGGER, FREE_TRIGGER),
-        )
-    ):
-        by_value.write(output, 0.001 * number)
-        by_wire.take_report(build_output_report(output, transport, number), 0.001 * number)
-        for device in (by_value, by_wire):
-            assert device.strengths == (l2, r2)
-            assert device.rumble == Rumble(1.0, 0.2)
-            assert device.released is (l2 == r2 == FREE_TRIGGER)
-    assert by_wire.commanded == by_value.commanded == Feel(FREE_TRIGGER, FREE_TRIGGER, Rumble(1.0, 0.2), (1, 2, 3))
 
 
 @TRANSPORTS

