@@ -14,12 +14,11 @@ from tests.console.browser import Browser, browser
 from tests.console.run import Run, running
 
 _LINK = ("--link", "delay 20ms 2ms distribution normal")
-_OUT = Path("console-pictures")
 
 
 @pytest.fixture(scope="session", name="browser")
 def chromium() -> Iterator[Browser]:
-    with browser(_OUT.absolute()) as opened:
+    with browser(Path("console-pictures").absolute()) as opened:
         yield opened
 
 

@@ -24,9 +24,6 @@ from tests.console.run import running
 MOST_S: Final = 90.0
 """Time limit of one run, from the moment when the page drives, in seconds"""
 _REACTION_S: Final = 0.25
-_SETTLES_S: Final = 0.3
-"""Time in which the arm and the shown figures come to rest after a move, beside delay and reaction"""
-_LOOK_S: Final = 0.03
 _RAMP_S: Final = 0.6
 """Time in which a held key's pull rises (docs/console.md)"""
 _STICK_MM_S, _TRIGGER_MM_S = 100.0, 250.0
@@ -35,7 +32,6 @@ _ALIGNED_MM: Final = 6.0
 _CLOSE_MM: Final = 20.0
 """Way of the target's middle behind the gripper's point at which the fingers close"""
 _LIFT_MM, _BACK_MM, _GENTLE_MM = 60.0, 60.0, 30.0
-_TRIES: Final = 3
 _LOST_S: Final = 30.0
 COLUMNS: Final = ("delay_ms", "seed", "grasped", "placed", "time_s", "contacts", "amber", "dead", "stops", "end")
 _SEEN: Final = """() => {
@@ -68,7 +64,7 @@ class Hand:
 
     def look(self) -> dict[str, Any]:
         """Take in what the page shows; return what it showed a reaction ago. OutOfTimeError at the time limit."""
-        time.sleep(_LOOK_S)
+        time.sleep(0.03)
         now_s = time.monotonic()
         if now_s - self.began_s > MOST_S:
             raise OutOfTimeError
@@ -124,7 +120,7 @@ class Hand:
     def settle(self) -> dict[str, Any]:
         """Wait until the outcome of the last move can be seen and the pictures are fresh; return what is seen then."""
         delays_ms = [float(figure) for figure in re.findall(r"[0-9.]+", self._seen[-1][1]["delay"])]
-        seen = self.wait(1e-3 * sum(delays_ms) + _REACTION_S + _SETTLES_S)
+        seen = self.wait(1e-3 * sum(delays_ms) + _REACTION_S + 0.3)  # the last 0.3 s for the arm and the figures
         return self.wait(_LOST_S, lambda one: not one["off"]) if seen["off"] else seen
 
     def move(self, level: int, ways_mm: Mapping[str, float], until: Callable[[dict[str, Any]], object]) -> None:
@@ -238,7 +234,7 @@ def drive(page: Page) -> tuple[Hand, str]:
         hand.arm()
         hand.began_s = time.monotonic()
         hand.look()
-        for _ in range(_TRIES):
+        for _ in range(3):
             approach(hand)
             if grasp(hand):
                 place(hand)

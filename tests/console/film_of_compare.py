@@ -4,7 +4,6 @@ import io
 import time
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Final
 
 import numpy as np
 from PIL import Image
@@ -14,9 +13,6 @@ from feelahead.commands.demo.settings import DemoSettings
 from tests.console.browser import SMALL, browser
 
 _FROM_S, _UNTIL_S, _PERIOD_S = 1.5, 21.5, 0.1
-_DRAWN_S: Final = 0.1
-_SIZE: Final = (960, 540)
-_QUALITY: Final = 40
 
 
 def make_compare_film(folder: Path, paths: Sequence[Path]) -> None:
@@ -30,9 +26,9 @@ def make_compare_film(folder: Path, paths: Sequence[Path]) -> None:
         page.ask("play(false)")
         for time_s in np.arange(_FROM_S, _UNTIL_S, _PERIOD_S):
             page.ask(f"show({time_s})")
-            time.sleep(_DRAWN_S)
+            time.sleep(0.1)
             with Image.open(io.BytesIO(page.shot())) as whole:
-                pictures.append(whole.convert("RGB").resize(_SIZE, Image.Resampling.LANCZOS))
+                pictures.append(whole.convert("RGB").resize((960, 540), Image.Resampling.LANCZOS))
     first, *others = pictures
     duration_ms = round(1e3 * _PERIOD_S)
-    first.save(path, save_all=True, append_images=others, duration=duration_ms, loop=0, quality=_QUALITY, method=4)
+    first.save(path, save_all=True, append_images=others, duration=duration_ms, loop=0, quality=40, method=4)

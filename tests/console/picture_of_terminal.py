@@ -18,8 +18,6 @@ from operator_side.viewing.facts import OperatorFacts
 from operator_side.viewing.terminal.screen import Screen
 from tests.helpers.repository import ROOT
 
-_DURATION_S: Final = 18.0
-_LIMIT_S: Final = 300.0
 _COLUMNS, _ROWS = 80, 24
 _STIFF: Final = 4
 _FONT: Final = re.compile(r"@font-face \{.*?\}", re.DOTALL)
@@ -29,9 +27,9 @@ _FONT: Final = re.compile(r"@font-face \{.*?\}", re.DOTALL)
 def make_picture_of_terminal(_: Path, paths: Sequence[Path]) -> None:
     """Run a demo, and write the terminal view as an SVG; AssertionError with the demo's last output if it fails."""
     (path,) = paths
-    asked = ("demo", "--no-console", "--status=facts", f"--duration={_DURATION_S}")
+    asked = ("demo", "--no-console", "--status=facts", "--duration=18")
     command = [sys.executable, "-P", "-m", "feelahead", *asked]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=_LIMIT_S, check=False, cwd=ROOT)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300.0, check=False, cwd=ROOT)
     if done.returncode != 0:
         raise AssertionError(f"feelahead demo: {done.stderr.strip()[-300:]}")
     screen = _near([json.loads(line) for line in done.stdout.splitlines()])

@@ -25,7 +25,6 @@ PARTS: Final[Mapping[str, tuple[Sequence[str], Callable[[Path, Sequence[Path]], 
     ),
 }
 """Files of each part, from docs/ on, and the function that makes them; `states` is for a look, and made if named"""
-_TRIES: Final = 3
 
 
 def main(names: Sequence[str]) -> int:
@@ -39,7 +38,7 @@ def main(names: Sequence[str]) -> int:
     for name in names or [part for part in PARTS if part != "states"]:
         files, make = PARTS[name]
         paths = [DOCS / file for file in files]
-        for left in reversed(range(_TRIES)):
+        for left in reversed(range(3)):
             try:
                 with tempfile.TemporaryDirectory(prefix="feelahead-") as folder:
                     make(Path(folder), paths)

@@ -18,14 +18,9 @@ from tests.console.test_hands import is_armed, pull, take_over
 STATES: Final = ("waiting", "ready", "armed", "running", "amber", "dead", "stopped", "link-lost", "ended")
 SIZES: Final = (SMALL, LARGE, (640, 800), (640, 360))
 """The last is SMALL at 200 % zoom."""
-_COLORS: Final = 256
-_STIFF: Final = 1
 _MEETS: Final = "parseInt(document.querySelector('#r2 .meets').textContent.match(/[0-9]+/)[0])"
 _FRESH: Final = f"{DRAWN} && document.querySelector('.view:not([data-age=fresh])') === null"
-_PULLED: Final = 0.2
 _CALM_S: Final = 1.0
-_SETTLES_S: Final = 60.0
-_LOOK_S: Final = 0.1
 
 
 def make_first_minute(folder: Path, paths: Sequence[Path]) -> None:
@@ -43,7 +38,7 @@ def make_first_minute(folder: Path, paths: Sequence[Path]) -> None:
         with page.held("Space"):
             page.wait_for_text("#hands_state", "You drive", 15.0)
             with page.held("KeyW"):
-                run.wait_until("pulled", lambda run: pull(run) > _PULLED, 5.0)
+                run.wait_until("pulled", lambda run: pull(run) > 0.2, 5.0)
                 _keep(page, folder, driving)
         page.press("Escape")
         run.wait_until("stopped", lambda run: not is_armed(run), 5.0)
@@ -114,10 +109,10 @@ def _settle(page: Page) -> None:
         page.wait("!document.querySelector('#scene iframe').hidden", "a scene", 60.0)
     calm_since_s = began_s = time.monotonic()
     while time.monotonic() - calm_since_s < _CALM_S:
-        assert time.monotonic() - began_s < _SETTLES_S
+        assert time.monotonic() - began_s < 60.0
         if not page.ask(_FRESH):
             calm_since_s = time.monotonic()
-        time.sleep(_LOOK_S)
+        time.sleep(0.1)
     page.ask("document.querySelector('#give_back').click()")
 
 
@@ -134,7 +129,7 @@ def _keep_stiffest(page: Page, run: Run, folder: Path, path: Path) -> None:
             most = meets
             _keep(page, folder, path)
         run.look()
-    assert most >= _STIFF
+    assert most >= 1
 
 
 def _doing(run: Run) -> str:
@@ -145,4 +140,4 @@ def _keep(page: Page, folder: Path, path: Path) -> None:
     """Write a picture of the present page, reduced to 256 colours."""
     page.picture(path.stem)
     with Image.open(folder / path.name) as whole:
-        whole.convert("RGB").quantize(_COLORS, dither=Image.Dither.NONE).save(path, optimize=True)
+        whole.convert("RGB").quantize(256, dither=Image.Dither.NONE).save(path, optimize=True)

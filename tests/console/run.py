@@ -16,7 +16,6 @@ Event = dict[str, Any]
 STATE: Final = "document.body.dataset.state"
 DRAWN: Final = "['overview', 'first_person'].every((view) => document.getElementById(view).dataset.frames > 2)"
 """JavaScript condition: pictures of both cameras have come"""
-_KEPT: Final = 400
 
 
 class Run:
@@ -26,7 +25,7 @@ class Run:
         """Address of the console, with the token that opens it"""
         self.process_ids: dict[str, int] = {}
         """Process id of each side, by the side's name"""
-        self.facts: deque[Event] = deque(maxlen=_KEPT)
+        self.facts: deque[Event] = deque(maxlen=400)
         """Facts that the console shows, ten a second, newest last"""
         self.notes: list[str] = []
 

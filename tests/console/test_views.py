@@ -15,7 +15,6 @@ pytestmark = [pytest.mark.console, pytest.mark.processes]
 
 
 VIEWS: Final = ("overview", "first_person")
-_OLDEST_MS: Final = 500.0
 _PATIENCE_S: Final = 60.0
 _LEAST_DETAIL: Final = 8.0
 """Minimum standard deviation of a picture's colours: it is 0 in an empty picture"""
@@ -41,7 +40,7 @@ def test_both_views_move(browser: Browser, fresh_demo: Run) -> None:
             _wait_for_change(page, view, before)
         # A busy machine may delay pictures, so it is enough if both are fresh at some time.
         end_s = time.monotonic() + _PATIENCE_S
-        while _oldest_ms(page) >= _OLDEST_MS:
+        while _oldest_ms(page) >= 500.0:
             assert time.monotonic() < end_s
         page.picture("views")
 

@@ -19,7 +19,6 @@ _PROJECT: Final = "feelahead-test"
 _LINK: Final = "delay 20ms 2ms distribution normal rate 100mbit"
 _OFFICIAL: Final = "python:3.11-slim-bookworm"
 _OWN: Final = "feelahead-base"
-_BUILD_LIMIT_S: Final = 1500.0
 _PATIENCE_S: Final = 60.0
 
 
@@ -45,7 +44,7 @@ def compose(engine: Engine) -> Iterator[Compose]:
     one = Compose(engine, settings)
     engine.remove()
     began_s = time.monotonic()
-    engine.compose("build", settings=settings, limit_s=_BUILD_LIMIT_S)
+    engine.compose("build", settings=settings, limit_s=1500.0)
     print(f"images built in {time.monotonic() - began_s:.0f} s")
     try:
         yield one

@@ -3,13 +3,11 @@
     python plugged_operator.py FOLDER [feel] [flags of feelahead-operator or feelahead feel]
 
 FOLDER/hidraw3 is a FIFO that gets the writes to the controller. While FOLDER/plugged exists, the controller is plugged
-in. While FOLDER/broken exists, reads and writes raise an error that no driver should raise. While FOLDER/hangs exists,
-no write returns.
+in. While FOLDER/broken exists, reads and writes raise an error that no driver should raise.
 """
 
 import os
 import sys
-import threading
 from pathlib import Path
 from typing import Any
 
@@ -47,8 +45,6 @@ class PluggedHandle(FakeHandle):
 
     def write(self, data: bytes) -> int:
         self._look()
-        while (FOLDER / "hangs").exists():
-            threading.Event().wait(0.01)
         return os.write(self._file, data) if self.plugged_in else -1
 
     def close(self) -> None:

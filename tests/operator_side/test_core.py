@@ -8,14 +8,14 @@ import pytest
 
 from common.protocol.codec import PROTOCOL_VERSION, decode, encode
 from common.protocol.link_end import LinkEnd
-from common.protocol.messages import AnyMessage, Hello, LeaseNotice, MotionCommand, Tune
+from common.protocol.messages import AnyMessage, Header, Hello, LeaseNotice, MotionCommand, Tune
 from common.protocol.session import SessionState
 from common.status.codes import LinkState, Sight
 from operator_side.controller.feel import USUAL_LIGHT, WARNING_LIGHT
 from operator_side.controller.state import Button
 from operator_side.core import OperatorSide
 from operator_side.hands.travel_calibration import TravelCalibration, TriggerTravel
-from tests.helpers.felt import telemetry
+from tests.helpers.felt import felt, field, onsets, telemetry
 from tests.operator_side.operator_bench import Bench
 
 
@@ -242,3 +242,27 @@ def test_the_way_home_is_asked_for_at_the_chosen_speed() -> None:
     for buttons in ((), (Button.MUTE,), ()):
         bench.hands(Button.L1, *buttons)
         assert {command.home for command in sent(bench, MotionCommand, 0.02)} == {0.5 if buttons else 0.0}
+
+
+@pytest.mark.parametrize(("session", "unknown"), [(SessionState.ARMED, 0), (SessionState.OBSERVING, 1)])
+def test_commands_that_end_mean_stop_and_an_observer_knows_none(
+    bench: Bench, session: SessionState, unknown: int
+) -> None:
+    bench.notice(SessionState.ARMED)
+    bench.hands()
+    bench.commands()
+    echo_s = bench.now_s
+    for _ in range(25):
+        bench.now_s += 0.004
+        bench.notice(SessionState.ARMED)
+        bench.hands(Button.L1, r2=1.0)
+        bench.commands()
+    for _ in range(2):  # Without a report of the controller nothing is sent.
+        bench.now_s += 0.2
+        bench.notice(session)
+        assert bench.commands() == []
+    header = Header(1, 100, bench.now_s, echo_sent_s=echo_s, echo_held_s=0.0)
+    bench.feel_field(msgspec.structs.replace(felt(header), r2=field(onsets(0.1)), horizon_m=1.0))
+    assert bench.side.summary()["rendering"]["without_history"] == unknown
+    # The last command counts until the end of commands is noted, 0.2 s later: δ = 0.25 * 0.296 = 74 mm, w = 0.
+    assert unknown or bench.device.strengths[1] == (0,) * 3 + (8,) * 7

@@ -6,7 +6,6 @@ from common.realtime.period_monitor import WINDOW_S, PeriodMonitor
 from common.realtime.stolen_time import StolenTime
 
 PERIOD_S = 1e-3
-REMEDY = "a faster machine"
 
 
 class Loop:
@@ -19,7 +18,7 @@ class Loop:
         self.wall, self.processor = VirtualClock(100.0), VirtualClock(7.0)
         self._waited, self._stolen = waited, stolen
         self.pacer = Pacer(PERIOD_S, 100.0)
-        self.period_monitor = PeriodMonitor(self.pacer, self.wall, self.processor, REMEDY, self._taken)
+        self.period_monitor = PeriodMonitor(self.pacer, self.wall, self.processor, "a faster machine", self._taken)
         self.said: list[str] = []
 
     def _taken(self) -> StolenTime:

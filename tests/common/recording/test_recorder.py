@@ -41,14 +41,14 @@ def numbers(path: Path, side: str = "robot") -> list[int]:
     return [int(one.content) for block in found for one in unpack_block(block.content).unpacked()]
 
 
-def note_until(recording: SideRecording, done: Callable[[], bool], size: int = 8) -> tuple[int, list[str]]:
+def note_until(recording: SideRecording, done: Callable[[], bool]) -> tuple[int, list[str]]:
     """Record the numbers 0, 1, 2 ... in real time until `done`; return their count and the recording's messages."""
     clock = MonotonicClock()
     end_s, count, said = clock.now() + LIMIT_S, 0, []
     while not done():
         assert clock.now() < end_s
         now_s = clock.now()
-        recording.noted.append((now_s, str(count).zfill(size).encode()))
+        recording.noted.append((now_s, str(count).zfill(8).encode()))
         count += 1
         said += recording.idle(now_s)
         time.sleep(1e-3)

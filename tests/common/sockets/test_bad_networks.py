@@ -11,8 +11,6 @@ from common.sockets.operator import OperatorSockets
 from common.sockets.robot import RobotSockets
 from tests.helpers.socket_talk import EPHEMERAL, ROUNDS
 
-_SYN_SENT = "02"
-
 
 @pytest.fixture
 def deaf_port() -> Iterator[int]:
@@ -29,7 +27,7 @@ def deaf_port() -> Iterator[int]:
 def attempts(port: int) -> set[str]:
     """Return the local addresses from which connections to `port` are being attempted."""
     rows = (line.split() for line in Path("/proc/net/tcp").read_text(encoding="ascii").splitlines()[1:])
-    return {row[1] for row in rows if row[3] == _SYN_SENT and row[2].endswith(f":{port:04X}")}
+    return {row[1] for row in rows if row[3] == "02" and row[2].endswith(f":{port:04X}")}  # SYN_SENT
 
 
 def test_an_attempt_that_nobody_answers_is_given_up(deaf_port: int) -> None:

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from common.clock import MonotonicClock
+from common.clock import VirtualClock
 from common.sockets import robot as robot_sockets
 from common.sockets.allow_list import AllowList
 from common.sockets.authentication import RobotKeys, make_key_pair
@@ -48,13 +48,6 @@ def drain(robot: RobotSockets, limit_s: float = 0.1) -> list[bytes]:
     while robot.wait(0.1 if received else limit_s):
         received += [payload for _, payload in robot.receive()]
     return received
-
-
-class StandingClock(MonotonicClock):
-    """Clock that always shows 0 s, so that all messages fall into the same second."""
-
-    def now(self) -> float:
-        return 0.0
 
 
 def descriptors() -> int:
@@ -142,17 +135,12 @@ def test_a_message_of_too_many_frames_is_dropped_in_bounded_steps(
         assert is_heard(robot, operator)
 
 
-def within_one_second(robot: RobotSockets, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Stop the robot side's clock, so that all messages fall into the same second, however long the test takes."""
-    monkeypatch.setattr(robot, "_second", 0)
-    monkeypatch.setattr(robot, "_clock", StandingClock())
-
-
 def test_a_peer_that_floods_is_cut_off_and_the_operator_is_not(
     robot: RobotSockets, operator: OperatorSockets, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(robot_sockets, "PEER_LIMIT_PER_S", 200)
-    within_one_second(robot, monkeypatch)
+    monkeypatch.setattr(robot, "_second", 0)
+    monkeypatch.setattr(robot, "_clock", VirtualClock())  # All messages fall into one second.
     received = 0
     with contextlib.closing(stranger(robot)) as connection:
         for _ in range(ROUNDS):

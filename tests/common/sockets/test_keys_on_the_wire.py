@@ -14,9 +14,8 @@ from common.sockets.keys import KeyFolder
 from common.sockets.operator import OperatorSockets
 from common.sockets.robot import RobotSockets
 from tests.helpers.machines.waiting import LIMIT_S
-from tests.helpers.socket_talk import PATIENT_S
+from tests.helpers.socket_talk import EPHEMERAL, PATIENT_S
 
-EPHEMERAL = "tcp://127.0.0.1:0"
 REFUSAL_S = 0.5
 """Seconds without a message after which a peer counts as kept out: much longer than a handshake on loopback"""
 

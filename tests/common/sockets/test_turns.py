@@ -13,15 +13,7 @@ from common.sockets.operator import OperatorSockets
 from common.sockets.peers import Connection, Peers
 from common.sockets.robot import RobotSockets
 from common.sockets.shell import VIEW_HIGH_WATER_MARK, VIEW_UNSENT_BYTES
-from common.sockets.turns import (
-    MOST_CONNECTIONS_EACH,
-    Offered,
-    TurnConnection,
-    Turns,
-    group_of,
-    new_group,
-    routing_id,
-)
+from common.sockets.turns import MOST_CONNECTIONS_EACH, Offered, TurnConnection, Turns, group_of, new_group, routing_id
 from tests.helpers.hostile.raw_zmtp import RawConnection, message, port_of
 from tests.helpers.socket_talk import PATIENT_S, ROUNDS, drain_all, greet, publish_until_seen
 

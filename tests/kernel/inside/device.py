@@ -19,7 +19,6 @@ from tests.helpers.machines.waiting import wait_until
 from tests.kernel.inside.driver import bound
 from tests.kernel.inside.plugged import ADDRESS, Plugged
 
-_NOBODY: Final = 65534
 _EFFECTS: Final[tuple[tuple[Strengths, Strengths], ...]] = (
     (feedback(position=3, strength=6), FREE_TRIGGER),
     (FREE_TRIGGER, feedback(position=0, strength=8)),

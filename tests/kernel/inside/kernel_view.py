@@ -46,7 +46,6 @@ BTN_SOUTH, BTN_TL = 0x130, 0x136
 _GET_AXIS: Final = 0x80184540  # EVIOCGABS(0), a struct input_absinfo
 _GET_KEYS: Final = 0x80604518  # EVIOCGKEY(96)
 _AXIS = struct.Struct("=6i")
-_KEY_BYTES = 96
 
 
 class InputDevice:
@@ -68,6 +67,6 @@ class InputDevice:
         return int(_AXIS.unpack(content)[0])
 
     def is_down(self, code: int) -> bool:
-        keys = bytearray(_KEY_BYTES)
+        keys = bytearray(96)
         fcntl.ioctl(self._descriptor, _GET_KEYS, keys)
         return bool(keys[code // 8] >> code % 8 & 1)

@@ -8,7 +8,6 @@ from common.errors import DeviceError
 from operator_side.evdev.pad import BUTTONS, find_pad
 from tests.kernel.inside.uinput_pad import ABS, KEY, UinputPad
 
-_KEYS = range(0x130, 0x13F)
 _STICKS = dict.fromkeys((0, 1, 2, 5), (0, 65535))
 _PEDALS = dict.fromkeys((9, 10), (0, 1023))
 _HATS = dict.fromkeys((16, 17), (-1, 1))
@@ -17,7 +16,7 @@ _L1, _EAST = 0x136, 0x131
 
 def test_whatever_the_queue_drops_each_read_gives_what_the_kernel_knows() -> None:
     generator = random.Random(3)  # noqa: S311  # repeatable, not secret
-    with UinputPad("Xbox by Bluetooth", _KEYS, _STICKS | _PEDALS | _HATS) as theirs:
+    with UinputPad("Xbox by Bluetooth", range(0x130, 0x13F), _STICKS | _PEDALS | _HATS) as theirs:
         pad = find_pad(None)
         assert pad.name.startswith("Xbox by Bluetooth at /dev/input/event")
         state = pad.device.read(0.0)

@@ -17,9 +17,7 @@ from tests.kernel.inside.plugged import Plugged, Variant
 
 _HEALTHY_S = 0.7
 """Seconds for which commands are sent before arming: longer than the robot side demands"""
-_PRESSED_S = 0.3
 _HOLD_TO_RUN = Button.L1
-_ARM = Button.OPTIONS
 
 
 class Desk:
@@ -90,10 +88,10 @@ def arm_and_move(desk: Desk) -> None:
         hold(plugged, _HOLD_TO_RUN)
         time.sleep(_HEALTHY_S)
         if robot.state != "armed":
-            hold(plugged, _HOLD_TO_RUN, _ARM)
+            hold(plugged, _HOLD_TO_RUN, Button.OPTIONS)
         else:
             hold(plugged, _HOLD_TO_RUN, r2_n=NORMAL_FINGER_FORCE_N)
-        time.sleep(_PRESSED_S)
+        time.sleep(0.3)
         return robot.moving
 
     wait_until("the arm would move", moving, instead=lambda: robot.state)

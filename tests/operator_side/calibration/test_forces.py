@@ -20,8 +20,7 @@ from operator_side.people.measuring_hands import MeasuringHands
 from tests.helpers.refusal import refusal
 
 ADDRESS = "aa:bb:cc:00:11:22"
-PULLS_N = (2.0, 2.1, 2.05, 2.3, 2.6, 2.9, 3.2, 3.5, 3.9)
-FORCES = TriggerForces(PULLS_N)
+FORCES = TriggerForces((2.0, 2.1, 2.05, 2.3, 2.6, 2.9, 3.2, 3.5, 3.9))
 RELEASED, PULLED = ControllerState(), ControllerState(l2=0.6, r2=0.6)
 
 

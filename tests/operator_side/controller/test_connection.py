@@ -4,12 +4,7 @@ import pytest
 
 from common.errors import DeviceError, NoDeviceError, NoDriverError
 from common.status.codes import ConnectionState
-from operator_side.controller.connection import (
-    BEAT_PERIOD_S,
-    LOOK_PERIOD_S,
-    REWRITE_AFTER_S,
-    Connection,
-)
+from operator_side.controller.connection import BEAT_PERIOD_S, LOOK_PERIOD_S, REWRITE_AFTER_S, Connection
 from operator_side.controller.feel import Feel
 from operator_side.controller.port import OpenController
 from operator_side.controller.search import BackgroundSearch

@@ -5,13 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from common.errors import DeviceError
-from operator_side.controller.feel import (
-    FREE_TRIGGER,
-    USUAL_LIGHT,
-    WARNING_LIGHT,
-    Feel,
-    Rumble,
-)
+from operator_side.controller.feel import FREE_TRIGGER, USUAL_LIGHT, WARNING_LIGHT, Feel, Rumble
 from operator_side.controller.state import Button, ControllerState
 from operator_side.dualsense.reports.output_report import build_output_report
 from operator_side.dualsense.reports.transport import Transport
@@ -26,7 +20,6 @@ from operator_side.dualsense.simulated.trigger_model import (
 from tests.helpers.felt import feedback
 
 TRANSPORTS = pytest.mark.parametrize("transport", Transport)
-FORCES = st.floats(0.0, 10.0)
 STRENGTHS = st.tuples(*[st.integers(0, 8)] * 10)
 STIFF = Feel(l2=feedback(3, 6), r2=feedback(0, 8))
 NAN, INF = float("nan"), float("inf")
@@ -36,7 +29,7 @@ def resistance_n(travel: float, strength: int) -> float:
     return SPRING_PRELOAD_N + SPRING_RISE_N * travel + STRENGTH_STEP_N * strength
 
 
-@given(FORCES, STRENGTHS)
+@given(st.floats(0.0, 10.0), STRENGTHS)
 def test_forces_balance_at_the_equilibrium(force_n: float, strengths: tuple[int, ...]) -> None:
     """Below the equilibrium travel the finger overcomes the resistance; there, or one zone farther, it does not."""
     travel = equilibrium_travel(force_n, strengths)

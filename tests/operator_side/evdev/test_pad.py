@@ -10,9 +10,9 @@ from operator_side.controller.feel import FREE_TRIGGER, RELEASED, WARNING_LIGHT,
 from operator_side.controller.state import Button
 from operator_side.evdev.pad import BUTTONS, LENGTH_S, EvdevPad
 from tests.helpers.felt import feedback
-from tests.operator_side.evdev.fake_node import ABS, KEY, FakeNode, state_of
+from tests.operator_side.evdev.fake_node import ABS, DROPPED, KEY, REPORT, FakeNode, state_of
 
-L1 = 0x136
+L1, R2_AXIS = 0x136, 5
 
 
 @pytest.fixture
@@ -74,6 +74,24 @@ def test_whatever_is_dropped_each_read_gives_what_the_kernel_knows(room: int) ->
         assert state.r2 == node.values[5] / 255
         assert state.left_stick[0] == pytest.approx((node.values[0] - 127.5) / 127.5, abs=0.005)
     node.close()
+
+
+def test_a_packet_with_a_gap_is_dropped_to_its_end_however_it_is_read(node: FakeNode, pad: EvdevPad) -> None:
+    gone_on, run = [(KEY, L1, 1), (ABS, R2_AXIS, 255)], frozenset({Button.L1})
+    for down, sent, r2, pressed in (
+        (set[int](), [(KEY, 0x131, 1), DROPPED, gone_on[0], DROPPED, gone_on[1]], 0.0, frozenset[Button]()),
+        (set[int](), gone_on, 0.0, frozenset[Button]()),
+        ({L1}, [*gone_on, REPORT], 0.0, run),
+        ({L1}, [*gone_on, REPORT], 1.0, run),
+    ):
+        node.down = down
+        node.send(*sent)
+        state = state_of(pad)
+        assert (state.r2, state.pressed) == (r2, pressed)
+    node.send(DROPPED, REPORT)
+    node.unplug()
+    with pytest.raises(DeviceError, match="gamepad is gone"):
+        pad.read(0.0)
 
 
 def test_a_pulled_trigger_is_felt_where_it_is_and_the_greater_rumble_counts(node: FakeNode, pad: EvdevPad) -> None:

@@ -24,7 +24,6 @@ FELT: st.SearchStrategy[Fields] = st.fixed_dictionaries(
 )
 NOTHING: Fields = {"l2": 0, "r2": 0, "rumble": 0.0, "state": "armed"}
 DANGER = NOTHING | {"l2": 8, "r2": 8, "rumble": 0.875}
-RELEASE = NOTHING | {"state": "disarmed"}
 
 
 class Run:

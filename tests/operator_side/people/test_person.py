@@ -241,14 +241,11 @@ def test_a_trusting_person_eases_off_a_reaction_after_a_stiffer_trigger(
         assert desk.hands[-1].r2_n == pytest.approx(habitual_force_n(GENTLY_M_S / FULL_TRIGGER_M_S))
 
 
-PULSE = Feel(rumble=Rumble(left=1.0, right=0.7))
-
-
 @pytest.mark.parametrize(("trust", "light"), [(1.0, USUAL_LIGHT), (0.0, USUAL_LIGHT), (1.0, WARNING_LIGHT)])
 def test_a_person_who_feels_the_contact_pulse_releases_a_reaction_later(trust: float, light: Color) -> None:
     desk = carried(dataclasses.replace(CLEAR_SIGHTED, trust=trust))
     desk.watch(at_height(UP_AT_M), 0.5)
-    desk.tell(dataclasses.replace(PULSE, light=light))
+    desk.tell(dataclasses.replace(Feel(rumble=Rumble(left=1.0, right=0.7)), light=light))
     seen = desk.watch(at_height(UP_AT_M), 0.08)
     desk.tell(Feel(rumble=Rumble()))
     seen += desk.watch(at_height(UP_AT_M), 0.5)

@@ -34,8 +34,6 @@ _CLONE_NEWNET: Final = 0x40000000
 _TUNSETIFF: Final = 0x400454CA
 _TUN_WITHOUT_HEADER: Final = 0x1001
 _CONTROLS: Final = Path("/proc/sys/net/ipv4/tcp_available_congestion_control")
-_NETWORK: Final = "10.78.0.0/24"
-_LARGEST: Final = 2048
 _IN_A_ROW: Final = 64
 """Maximum number of packets read from a device before due packets are delivered"""
 
@@ -86,7 +84,7 @@ def _hosts(control: str | None) -> Iterator[tuple[dict[str, str], list[int]]]:
             _ip("-n", namespace, "address", "add", f"{ADDRESSES[host]}/32", "dev", DEVICE)
             # Without IPv6 addresses the device sends nothing by itself.
             _ip("-n", namespace, "link", "set", DEVICE, "addrgenmode", "none", "up")
-            route = ("route", "add", _NETWORK, "dev", DEVICE, "src", ADDRESSES[host])
+            route = ("route", "add", "10.78.0.0/24", "dev", DEVICE, "src", ADDRESSES[host])
             # The route decides: a namespace's default is limited to the controls allowed to all users of the machine.
             _ip("-n", namespace, *route, *(() if control is None else ("congctl", control)))
         yield namespaces, descriptors
@@ -135,7 +133,7 @@ class _Forwarder:
     def _read(self, number: int) -> None:
         for _ in range(_IN_A_ROW):
             try:
-                packet = os.read(self._devices[number], _LARGEST)
+                packet = os.read(self._devices[number], 2048)
             except BlockingIOError:
                 return
             due_s = self._ways[number].take(len(packet), time.monotonic())

@@ -19,7 +19,6 @@ WARM_UP_S: Final = 3.0
 _ENDPOINT: Final = f"tcp://{ADDRESSES['operator']}:5555"
 _STAMP: Final = struct.Struct("<d?")
 """Time of sending, by the clock that both hosts share, and whether the message counts"""
-_SETTLES_S: Final = 1.0
 
 
 def receive() -> None:
@@ -59,7 +58,7 @@ def send(hz: float, seconds: float) -> None:
     socket = context.socket(zmq.DEALER)
     socket.setsockopt(zmq.SNDHWM, 0)
     socket.connect(_ENDPOINT)
-    start_s = time.monotonic() + _SETTLES_S
+    start_s = time.monotonic() + 1.0
     padding = bytes(PAYLOAD_BYTES - _STAMP.size)
     for number in range(int(hz * (WARM_UP_S + seconds))):
         time.sleep(max(0.0, start_s + number / hz - time.monotonic()))

@@ -18,7 +18,6 @@ from tests.two_hosts.wide_area.forwarder import ADDRESSES
 from tests.two_hosts.wide_area.trial import Trial
 from tests.two_hosts.wide_area.tunnels import Child, Host, WideArea
 
-_LOOKS_S: Final = 0.05
 _ENDPOINT: Final = f"{ADDRESSES['robot']}:5555"
 _DEVICES: Final = {"drives": "simulated", "rests": "browser"}
 
@@ -88,7 +87,7 @@ class _Sides:
         began_s = time.monotonic()
         for of_all in (1 / 3, 1.0):
             while (passed_s := time.monotonic() - began_s) < of_all * trial.seconds:
-                time.sleep(_LOOKS_S)
+                time.sleep(0.05)
                 self._listen(passed_s)
             if of_all == 1 / 3 and trial.observer == "stops" and self.observer is not None:
                 self.stack.callback(os.kill, self.observer.process_id, signal.SIGCONT)

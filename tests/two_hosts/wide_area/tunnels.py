@@ -6,7 +6,7 @@ import subprocess
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Final, Literal, Self
+from typing import Any, Literal, Self
 
 import msgspec
 
@@ -16,8 +16,6 @@ from tests.two_hosts.wide_area.forwarder import Order
 from tests.two_hosts.wide_area.wire_direction import Direction, DirectionSettings
 
 Host = Literal["robot", "operator"]
-_PACKAGE: Final = __package__
-_ENDS_S: Final = 5.0
 
 
 class Child:
@@ -25,7 +23,7 @@ class Child:
 
     def __init__(self, module: str, *arguments: str, before: Sequence[str] = ()) -> None:
         environment = os.environ | {"PYTHONPATH": str(ROOT)}
-        command = [*before, sys.executable, "-P", "-m", f"{_PACKAGE}.{module}", *arguments]
+        command = [*before, sys.executable, "-P", "-m", f"{__package__}.{module}", *arguments]
         self.name = module
         self._process = subprocess.Popen(
             command,
@@ -72,7 +70,7 @@ class Child:
         assert self._process.stdout is not None
         self._process.stdin.close()
         try:
-            self._process.wait(_ENDS_S)
+            self._process.wait(5.0)
         except subprocess.TimeoutExpired:
             self._process.kill()
             self._process.wait()
