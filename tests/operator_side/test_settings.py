@@ -4,8 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from common.command.command_line import parse_settings
-from operator_side.hands.travel_calibration import StickRest, TravelCalibration, TriggerTravel
+from operator_side.hands.travel_calibration import StickRest, TriggerTravel
 from operator_side.settings import OperatorSettings
 
 
@@ -29,18 +28,6 @@ def test_a_stick_that_rests_aside_has_a_smaller_dead_zone() -> None:
     StickRest(x=0.12, y=-0.16, dead_zone=0.79)
     with pytest.raises(ValueError, match=r"dead_zone = 0\.81; valid: 0 to below 0\.8"):
         StickRest(x=0.12, y=-0.16, dead_zone=0.81)
-
-
-def test_a_file_sets_everything_and_flags_win(tmp_path: Path) -> None:
-    usual = OperatorSettings()
-    assert (usual.device, usual.connect, usual.compensation) == ("hid", "tcp://127.0.0.1:5555", "operator")
-    path = tmp_path / "operator.toml"
-    path.write_text('device = "simulated"\nhaptics = false\n[person]\nattempts = 5\nlift_m = 0.2\n')
-    flags = ["--haptics", "--compensation=robot", "--person.attempts=2", "--calibration.l2.dead-zone=0.1"]
-    settings = parse_settings(OperatorSettings, "operator", ["--config", str(path), *flags])
-    assert (settings.device, settings.haptics, settings.compensation) == ("simulated", True, "robot")
-    assert (settings.person.attempts, settings.person.lift_m) == (2, 0.2)
-    assert settings.calibration == TravelCalibration(l2=TriggerTravel(dead_zone=0.1))
 
 
 @pytest.mark.parametrize(("text", "seconds"), [("0ms", 0.0), ("12ms", 0.012), ("-12ms", -0.012), ("-2s", -2.0)])

@@ -1,6 +1,5 @@
 """A run's status in words: the live line is never cut within a fact, and the story prints each change once."""
 
-import math
 from typing import Any
 
 import pytest
@@ -91,14 +90,6 @@ def test_what_keeps_the_arm_from_moving_comes_first_and_in_words(changed: dict[s
     view = approach(**changed)
     assert live_line(view, 79).startswith(expected)
     assert view.alarm is expected.partition("  ")[0].isupper()
-
-
-def test_what_is_not_known_is_no_zero() -> None:
-    line = live_line(LiveView(None, OperatorStatus(link=LinkState.UP)), 79)
-    assert line == "starting  L2/R2 pull –/–% resist –/–%  near –mm  target –mm  link –ms"
-    assert live_line(LiveView(RobotStatus(nearest_mm=math.nan, r2=math.inf)), 79) == (
-        "waiting for an operator  L2/R2 pull –/–% resist –/–%  near –mm  target –mm"
-    )
 
 
 @pytest.mark.parametrize(

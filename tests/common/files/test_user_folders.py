@@ -4,8 +4,6 @@ import pytest
 
 from common.files.user_folders import configuration_folder
 
-HOME = Path("/home/someone")
-
 
 @pytest.mark.parametrize(
     ("platform", "environment", "folder"),
@@ -21,4 +19,4 @@ HOME = Path("/home/someone")
     ],
 )
 def test_each_system_has_its_own(platform: str, environment: dict[str, str], folder: str) -> None:
-    assert configuration_folder(platform, environment, HOME) == Path(folder)
+    assert configuration_folder(platform, environment, Path("/home/someone")) == Path(folder)

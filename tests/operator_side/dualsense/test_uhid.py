@@ -16,7 +16,6 @@ from tests.helpers.fake_kernel import START, FakeKernel, PlainController, get_re
 
 CREATE2, DESTROY, INPUT2, GET_REPORT_REPLY = 11, 1, 12, 10
 ANSWER = bytes.fromhex("0a000000 01000000 0000 0300 050102")
-FIRST_INPUT = bytes.fromhex("0c000000 0200 0102")
 
 
 @pytest.mark.parametrize(("model", "product_id"), [(Model.DUALSENSE, 0x0CE6), (Model.EDGE, 0x0DF2)])
@@ -93,7 +92,7 @@ def test_a_life_from_plug_to_unplug() -> None:
     assert (kinds[0], kernel.heard[-1][1]) == (CREATE2, bytes.fromhex("01000000"))
     assert kernel.heard[1] == (100.0, ANSWER)
     assert [now_s for now_s, _ in kernel.heard_of(INPUT2)] == pytest.approx([100.004, 100.008, 100.012, 100.016])
-    assert kernel.heard_of(INPUT2)[0][1] == FIRST_INPUT
+    assert kernel.heard_of(INPUT2)[0][1] == bytes.fromhex("0c000000 0200 0102")
 
 
 def test_questions_are_answered_as_they_come_and_reports_go_out_in_time_while_a_driver_has_it() -> None:

@@ -117,7 +117,6 @@ REFUSED = {
         (PAD_KEYS[:8], axes((0, 1, 3, 4), SIGNED, (18, 19), (-1, 1, 0))),
         "no triggers with a travel .*ABS_HAT1X",
     ),
-    "old pad of two sticks": ((NUMBERED, axes((0, 1, 2, 5), BYTE, (), TRIGGER)), "no triggers with a travel, only"),
     "triggers without a range": (
         (NAMED, axes((0, 1, 3, 4), SIGNED, OLD, (0, 0, 0))),
         "no triggers .*; without a range: ABS_Z from 0 to 0, ABS_RZ from 0 to 0$",

@@ -205,11 +205,3 @@ def test_what_is_to_be_touched_is_felt_beside_a_stick_in_the_zones_that_touch_it
     assert report is not None
     assert report.r2 is not None
     assert report.r2[1] == 4
-
-
-def test_a_map_counts_that_came_before_arming_or_was_overtaken() -> None:
-    commanded = around(dict.fromkeys((*RIGHT_ACROSS, 0), 0.03))
-    made = haptics()
-    made.take_map(message(0.3, commanded))
-    made.take_map(message(0.29, around({})))
-    assert strengths(made, message(0.32, None))[-1] == 8

@@ -31,9 +31,6 @@ def fields(draw: st.DrawFn) -> TriggerField:
     return field(fast, onsets(*sorted(slow)), full_speed_m_s=full, acceleration_m_s2=acceleration)
 
 
-MOVING = st.builds(Displacement, WAY, st.floats(-0.3, 0.3))
-
-
 def test_the_middles_of_the_zones_are_of_the_mechanical_travel() -> None:
     whole = zone_travels(TriggerTravel(0.0, 1.0))
     assert whole == pytest.approx((1 / 15, 0.2, 1 / 3, 7 / 15, 0.6, 11 / 15, 13 / 15, 1.0, 1.0, 1.0))
@@ -56,7 +53,7 @@ def one_by_one(ahead: TriggerField, travels: tuple[float, ...], other: float, mo
     return strengths[1:]
 
 
-@given(fields(), TRAVEL, MOVING, st.floats(0.0, 0.4))
+@given(fields(), TRAVEL, st.builds(Displacement, WAY, st.floats(-0.3, 0.3)), st.floats(0.0, 0.4))
 def test_each_zone_is_what_the_equation_gives(
     ahead: TriggerField, other: float, moving: Displacement, away: float
 ) -> None:

@@ -321,3 +321,18 @@ def habitual_travel(force_n: float) -> float:
     return (
         0.0 if force_n == 0.0 else CALIBRATION.r2.travel((force_n - SPRING_PRELOAD_N) / SPRING_RISE_N / SENSED_TRAVEL)
     )
+
+
+def test_misjudged_distances_spread_as_they_are_said_to() -> None:
+    errors_m = []
+    for seed in range(60):
+        desk = Desk(PersonSettings(depth_error_sd_m=0.01, grasp_depth_m=GRASP_M), seed)
+        desk.arm()
+        force_n = desk.watch(armed((0.0, 0.0, 0.1)), 0.3)[-1].r2_n
+        free = ((force_n - SPRING_PRELOAD_N) / SPRING_RISE_N) / SENSED_TRAVEL
+        errors_m.append(CALIBRATION.r2.travel(free) * FULL_TRIGGER_M_S / crossover(0.25) - 0.1 - GRASP_M)
+    mean = sum(errors_m) / 60
+    sd = math.sqrt(sum((error - mean) ** 2 for error in errors_m) / 59)
+    # Three standard errors.
+    assert abs(mean) < 3 * 0.01 / math.sqrt(60)
+    assert sd == pytest.approx(0.01, rel=3 / math.sqrt(2 * 59))
