@@ -8,12 +8,22 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from common.sockets import authentication
 from common.sockets.descriptors import shut_down
 from common.sockets.operator import OperatorSockets
 from common.sockets.peers import Connection, Peers
 from common.sockets.robot import RobotSockets
-from common.sockets.shell import VIEW_HIGH_WATER_MARK, VIEW_UNSENT_BYTES
-from common.sockets.turns import MOST_CONNECTIONS_EACH, Offered, TurnConnection, Turns, group_of, new_group, routing_id
+from common.sockets.shell import CONTROL_UNSENT_BYTES, VIEW_HIGH_WATER_MARK, VIEW_UNSENT_BYTES
+from common.sockets.turns import (
+    CONNECTIONS,
+    MOST_CONNECTIONS_EACH,
+    Offered,
+    TurnConnection,
+    Turns,
+    group_of,
+    new_group,
+    routing_id,
+)
 from tests.helpers.hostile.raw_zmtp import RawConnection, message, port_of
 from tests.helpers.socket_talk import PATIENT_S, ROUNDS, drain_all, greet, publish_until_seen
 
@@ -126,6 +136,18 @@ def test_a_connection_that_breaks_off_comes_back_to_the_same_peer(
 def unsent_bytes(descriptor: int) -> int:
     """Return the number of bytes that the kernel holds for a connection and has not sent (SIOCOUTQNSD)."""
     return int(struct.unpack("i", fcntl.ioctl(descriptor, 0x894B, bytes(4)))[0])
+
+
+def test_the_kernel_holds_little_for_the_operator_sides_connections_too(
+    robot: RobotSockets, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    held: list[int] = []
+    monkeypatch.setattr(authentication, "hold_little", lambda _, unsent_bytes: held.append(unsent_bytes))
+    with OperatorSockets(robot.control_endpoint, robot.view_endpoint, heartbeat_timeout_s=PATIENT_S) as operator:
+        publish_until_seen(robot, operator, b"telemetry")
+        greet(robot, operator)
+        assert any(len(held) > CONNECTIONS for _ in range(ROUNDS) if operator.wait(0.01) or not operator.receive())
+    assert sorted(held) == sorted([*[CONTROL_UNSENT_BYTES] * CONNECTIONS, VIEW_UNSENT_BYTES])
 
 
 def test_little_waits_for_a_peer_that_stops_reading_and_others_lose_nothing(
