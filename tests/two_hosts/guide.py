@@ -16,7 +16,6 @@ from tests.two_hosts.lan import Host, Lan
 
 GUIDE: Final = ROOT / "docs" / "two-machines.md"
 PORTS: Final = ("5555", "5556")
-_INDENT: Final = "    "
 _PLACEHOLDER: Final = re.compile(r"\b(?:ROBOT|OPERATOR)(?:-KEY)?\b")
 _USUAL_FIREWALL: Final = (
     "nft add table inet filter; nft add chain inet filter input '{ type filter hook input priority 0; policy drop; }'; "
@@ -42,7 +41,7 @@ def steps(path: Path = GUIDE) -> list[Step]:
     named: list[str] = []
     paragraph = ""
     for line in path.read_text(encoding="utf-8").splitlines():
-        if line.startswith(_INDENT):
+        if line.startswith("    "):
             if paragraph:
                 named, paragraph = re.findall(r"\bthe (robot|operator)'s", paragraph, flags=re.IGNORECASE), ""
             assert named, f"{path.name}: {line.strip()!r}: neither machine is named before it"

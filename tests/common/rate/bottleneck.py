@@ -14,10 +14,7 @@ from common.rate.pieces import Joining
 from robot_side.viewing.picture_rate_control import PictureRateControl
 
 TURN_S = 0.001
-_OTHER_CLOCK_S = 1234.5
-_FULL_PICTURE_BYTES = 15_000
 _VIEWS = 2
-_HAPTICS_S = 0.01
 _BEHIND_S = 0.03
 _LIMIT_BYTES = 1 << 22
 
@@ -100,7 +97,7 @@ class _Sides:
         back.push(0.0, self._operator.hello(self._there_s(0.0)), 100)
 
     def _there_s(self, now_s: float) -> float:
-        return now_s * (1.0 + self._drift) + _OTHER_CLOCK_S
+        return now_s * (1.0 + self._drift) + 1234.5
 
     def _due(self, name: str | int, period_s: float, now_s: float) -> bool:
         if now_s < self._next_s.get(name, 0.0):
@@ -124,7 +121,7 @@ class _Sides:
 
     def feel(self, now_s: float) -> None:
         budget = self.ran.budget
-        if self._due("haptics", max(_HAPTICS_S, budget.haptic_interval_s), now_s):
+        if self._due("haptics", max(0.01, budget.haptic_interval_s), now_s):
             budget.spend("haptics", 200, now_s)
             self._out.push(now_s, ("haptics", Watch(self._robot.stamp(now_s))), 200)
         if self._due("telemetry", 0.02, now_s) and budget.may_send_telemetry(160, now_s):
@@ -139,7 +136,7 @@ class _Sides:
         for view in range(_VIEWS):
             self._next_s.setdefault(view, now_s + view * 0.5 / step.rate_hz)
             if budget.waiting_s("video") < _BEHIND_S and self._due(view, 1.0 / step.rate_hz, now_s):
-                size_bytes = int(_FULL_PICTURE_BYTES * step.bytes_share())
+                size_bytes = int(15_000 * step.bytes_share())
                 picture_rate_control.made(size_bytes, step)
                 name = next(self._number).to_bytes(8)
                 self._shown_s[name] = now_s

@@ -110,6 +110,31 @@ def test_a_crowd_is_hung_up_on_and_connected_peers_stay(monkeypatch: pytest.Monk
             assert is_heard(robot, late)
 
 
+def come_and_go(robot: RobotSockets, endpoint: str, count: int) -> None:
+    """Let `count` strangers connect and leave while the robot side reads nothing."""
+    before = descriptors()
+    crowd = [RawConnection(port_of(endpoint)) for _ in range(count)]
+    assert any(descriptors() >= before + 2 * count for _ in range(ROUNDS) if not robot.wait(0.01))
+    for connection in crowd:
+        connection.close()
+    assert any(descriptors() <= before for _ in range(ROUNDS) if not robot.wait(0.01))
+
+
+def test_the_new_owner_of_a_strangers_descriptor_is_not_hung_up_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(robot_sockets, "MOST_CONNECTIONS", 20)
+    monkeypatch.setattr(robot_sockets, "_EVENTS_PER_CALL", 10)
+    hung_up: list[int] = []
+    monkeypatch.setattr(robot_sockets, "shut_down", hung_up.append)
+    with RobotSockets(EPHEMERAL, heartbeat_timeout_s=PATIENT_S) as robot:
+        come_and_go(robot, robot.view_endpoint, 100)
+        with OperatorSockets(robot.control_endpoint, robot.view_endpoint, heartbeat_timeout_s=PATIENT_S) as operator:
+            assert is_heard(robot, operator)
+            for _ in range(50):
+                robot.receive()
+            assert hung_up == []
+            assert robot._all_seen
+
+
 def test_the_largest_message_that_is_allowed_arrives_and_the_next_larger_does_not(robot: RobotSockets) -> None:
     with contextlib.closing(stranger(robot)) as connection:
         connection.send(message(bytes(CONTROL_LIMIT_BYTES)))

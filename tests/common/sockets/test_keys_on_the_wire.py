@@ -16,9 +16,6 @@ from common.sockets.robot import RobotSockets
 from tests.helpers.machines.waiting import LIMIT_S
 from tests.helpers.socket_talk import EPHEMERAL, PATIENT_S
 
-REFUSAL_S = 0.5
-"""Seconds without a message after which a peer counts as kept out: much longer than a handshake on loopback"""
-
 
 @dataclass
 class Robot:
@@ -80,7 +77,7 @@ def gets_in(robot: Robot, operator: OperatorSockets) -> bool:
     return bool(seen.at_robot and seen.control and seen.view)
 
 
-def stays_out(robot: Robot, operator: OperatorSockets, limit_s: float = REFUSAL_S) -> bool:
+def stays_out(robot: Robot, operator: OperatorSockets, limit_s: float = 0.5) -> bool:
     return exchange(robot, operator, limit_s, until_both=False) == Seen([], [], [])
 
 

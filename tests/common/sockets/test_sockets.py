@@ -104,16 +104,6 @@ def test_the_operator_wakes_on_either_socket(robot: RobotSockets, operator: Oper
     assert operator.receive() == [b"stiffness"]
 
 
-def test_no_wake_is_lost_between_sends_and_receives(robot: RobotSockets, operator: OperatorSockets) -> None:
-    peer = greet(robot, operator)
-    for number in range(2000):
-        assert robot.send(peer, b"%d" % number)
-        assert operator.wait(PATIENT_S)
-        assert operator.receive() == [b"%d" % number]
-        assert operator.send(b"%d" % number)
-        assert receive_one(robot) == (peer, b"%d" % number)
-
-
 def test_signals_that_bring_nothing_prolong_no_wait(robot: RobotSockets, monkeypatch: pytest.MonkeyPatch) -> None:
     """Strangers who connect again and again must not delay the robot side's next tick."""
     clock, (reading, writing) = VirtualClock(), os.pipe()

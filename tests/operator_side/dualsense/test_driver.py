@@ -85,6 +85,10 @@ def test_permission_is_seen_even_where_hidapi_does_not_say(tmp_path: Path, monke
         HidDualSense(FakeBackend({}), b"/dev/nowhere")
 
 
+def test_the_installed_hidapi_is_taken() -> None:
+    assert load_backend() is pytest.importorskip("hidraw")
+
+
 def test_another_package_of_that_name(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "hidraw", types.ModuleType("hidraw"))
     with pytest.raises(NoDriverError, match="is not hidapi's: uninstall the package that brings it"):

@@ -14,7 +14,7 @@ from feelahead.commands.doctor.finding import Verdict
 from operator_side.controller.state import Button
 from operator_side.evdev import pad as pad_module
 from operator_side.evdev.pad import EvdevPad
-from tests.operator_side.evdev.fake_node import ABS, AXES, HATS, KEY, PAD_KEYS, FakeNode, state_of
+from tests.operator_side.evdev.fake_node import ABS, AXES, HATS, KEY, FakeNode, state_of
 
 Span = tuple[int, ...]
 Axes = Mapping[int, Span]
@@ -112,10 +112,6 @@ REFUSED = {
     "Switch Pro (hid-nintendo)": (
         (NAMED, axes((0, 1, 3, 4), SIGNED, (), TRIGGER)),
         r"no triggers with a travel, only buttons \(ABS_HAT2Y and ABS_HAT2X or .*\); its axes: ABS_X, ABS_Y, ABS_RX,",
-    ),
-    "two directional pads": (
-        (PAD_KEYS[:8], axes((0, 1, 3, 4), SIGNED, (18, 19), (-1, 1, 0))),
-        "no triggers with a travel .*ABS_HAT1X",
     ),
     "triggers without a range": (
         (NAMED, axes((0, 1, 3, 4), SIGNED, OLD, (0, 0, 0))),
