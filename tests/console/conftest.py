@@ -13,8 +13,6 @@ import pytest
 from tests.console.browser import Browser, browser
 from tests.console.run import Run, running
 
-_LINK = ("--link", "delay 20ms 2ms distribution normal")
-
 
 @pytest.fixture(scope="session", name="browser")
 def chromium() -> Iterator[Browser]:
@@ -25,7 +23,7 @@ def chromium() -> Iterator[Browser]:
 @pytest.fixture(scope="module")
 def link(request: pytest.FixtureRequest) -> tuple[str, ...]:
     """Arguments by which the demo emulates a link. A test module may set its own as `LINK`."""
-    return getattr(request.module, "LINK", _LINK)
+    return getattr(request.module, "LINK", ("--link", "delay 20ms 2ms distribution normal"))
 
 
 @pytest.fixture(scope="session")

@@ -54,7 +54,6 @@ def test_flags_win_over_the_file_which_wins_over_defaults(tmp_path: Path) -> Non
         (["--size-m", "-1"], "--size-m = -1.0; valid: at least 0"),
         (["--duration", "0"], "0.0"),
         (["--link", "delay -5ms"], "-5ms"),
-        (["--link", "dealy 5ms"], "dealy"),
         (["--link-model", "pigeon"], "pigeon"),
         (["--config"], "--config"),
         (["--config", "missing.toml"], "missing.toml"),
@@ -70,12 +69,9 @@ def test_bad_flags_become_one_line_that_names_them(arguments: list[str], named: 
 @pytest.mark.parametrize(
     ("content", "named"),
     [
-        ("probability = ", "no valid TOML"),
-        ("probability = 'x'", "probability"),
         ("probabilty = 0.9", "probabilty"),
         ("[camera]\nsd = 1.0", "camera.sd"),
         ("[camera]\nsd_m = -1.0", "sd_m = -1.0"),
-        ("camera = 3", "camera"),
         ("seed = -4", "-4"),
         (f"probability = 1{400 * '0'}", "more than 64 bits"),
         (f"seed = 1{5000 * '0'}", "more than 64 bits"),

@@ -25,7 +25,6 @@ from tests.helpers.refusal import refusal
         ),
         ("seed = " + "[" * 3 + '"' + "a" * 500 + '"' + "]" * 3, "aaa...; valid: a whole number"),
         ('[roles]\ntin = "box"', 'valid: a table of NAME = "obstacle" or "target" or "support" or "ignored"'),
-        ("[camera]\nsd_m = 7.0", "camera.sd_m = 7.0; valid: 0 to 1"),
     ],
 )
 def test_the_line_names_a_way_out(tmp_path: Path, content: str, expected: str) -> None:

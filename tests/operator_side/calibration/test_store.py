@@ -43,10 +43,8 @@ def test_every_calibration_is_read_as_it_was_written(calibration: TravelCalibrat
     ("old", "new", "named"),
     [
         ("version = 1", "version = 2", "version = 2"),
-        ("version = 1", "version = true", "version = true"),
         ("version = 1\n", "", "missing required field `version`"),
         ("dead_zone = 0.06", "dead_zone = 0.95", "l2: dead_zone = 0.95"),
-        ("dead_zone = 0.06", "dead_zone = nan", "l2: dead_zone = nan"),
         ("dead_zone = 0.06", "dead_zone = true", "l2.dead_zone = true"),
         ("dead_zone = 0.06", "", "l2.dead_zone is missing"),
         ("saturation = 0.91", "saturation = 0.91\nsaturated = 1", "l2.saturated is unknown"),

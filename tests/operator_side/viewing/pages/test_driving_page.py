@@ -21,7 +21,6 @@ NO_HANDS: list[object] = [
     {"hands": {"page": "a", "number": -1}},
     {"hands": {"page": "a", "number": 1, "r2": 1.01}},
     {"hands": {"page": "a", "number": 1, "r2": math.nan}},
-    {"hands": {"page": "a", "number": 1, "l2": math.inf}},
     {"hands": {"page": "a", "number": 1, "lateral": [0.0, -1.1]}},
     {"hands": {"page": "a", "number": 1, "turning": [0.0]}},
     {"hands": {"page": "a", "number": 1, "gripper": 2}},
