@@ -17,6 +17,8 @@ _KERNEL_PACKAGE: Final = "linux-image-amd64"
 
 @dataclass(frozen=True, slots=True)
 class Parts:
+    """Parts of the virtual machine."""
+
     qemu: Path
     qemu_environment: dict[str, str]
     """Environment variables by which QEMU finds its libraries"""

@@ -16,8 +16,10 @@ from tests.kernel.ramdisk import WRITABLE, make_ramdisk, module_order
 pytestmark = [pytest.mark.kernel, pytest.mark.processes]
 
 _INSIDE = Path(__file__).parent / "inside"
-_FILES = ("operator_side.py", "layouts.py", "gamepad.py", "driver.py", "device.py")
+_FILES = ("operator_side.py", "command.py", "layouts.py", "gamepad.py", "driver.py", "device.py")
 """Test files in the order in which they run; the last two leave a controller plugged in"""
+_LIMIT_S = 3600.0
+_LAST_WORDS = 25
 
 
 def test_its_own_driver_and_ours_drive_a_controller(tmp_path: Path) -> None:
@@ -42,9 +44,9 @@ def test_its_own_driver_and_ours_drive_a_controller(tmp_path: Path) -> None:
     print(f"booting {parts.kernel.name.removeprefix('vmlinuz-')}", flush=True)
     code = None
     try:
-        code = run_machine(parts, ramdisk, console, 3600.0)
+        code = run_machine(parts, ramdisk, console, _LIMIT_S)
     finally:
         if code != 0 and console.exists():
             print("the kernel's last words:")
-            print("\n".join(console.read_text(errors="replace").splitlines()[-25:]))
+            print("\n".join(console.read_text(errors="replace").splitlines()[-_LAST_WORDS:]))
     assert code == 0

@@ -19,6 +19,7 @@ from tests.helpers.machines.waiting import wait_until
 from tests.kernel.inside.driver import bound
 from tests.kernel.inside.plugged import ADDRESS, Plugged
 
+_NOBODY: Final = 65534
 _EFFECTS: Final[tuple[tuple[Strengths, Strengths], ...]] = (
     (feedback(position=3, strength=6), FREE_TRIGGER),
     (FREE_TRIGGER, feedback(position=0, strength=8)),
@@ -29,6 +30,7 @@ _EFFECTS: Final[tuple[tuple[Strengths, Strengths], ...]] = (
 
 @contextlib.contextmanager
 def our_device(plugged: Plugged) -> Iterator[HidDualSense]:
+    """Our driver, open on the virtual controller during the context."""
     hidraw = bound(plugged).hidraw()
     assert hidraw is not None
     device = HidDualSense(load_backend(), os.fsencode(hidraw))
@@ -39,6 +41,7 @@ def our_device(plugged: Plugged) -> Iterator[HidDualSense]:
 
 
 def newest_state(device: HidDualSense) -> ControllerState | None:
+    """Return the state by the newest input report; None if no report came."""
     return device.read(0.0)
 
 
@@ -97,6 +100,16 @@ def test_it_is_told_exactly_what_is_written_and_released_at_the_end(plugged: Plu
         assert plugged.offered.counts.refused == 0
     wait_until("closing releases the triggers", lambda: plugged.ask(lambda controller: controller.released))
     assert plugged.ask(lambda controller: controller.rumble) == Rumble(), "closing leaves the motors on"
+
+
+def test_without_permission_it_says_what_to_do(plugged: Plugged) -> None:
+    bound(plugged)
+    os.setresuid(_NOBODY, _NOBODY, 0)
+    try:
+        with pytest.raises(DeviceError, match=r"no permission.*feelahead doctor"):
+            find_controller(load_backend())
+    finally:
+        os.setresuid(0, 0, 0)
 
 
 def test_an_unplugged_one_is_gone_and_found_when_it_is_back(plugged: Plugged) -> None:

@@ -34,6 +34,7 @@ def bound(plugged: Plugged) -> KernelView:
 
 @contextlib.contextmanager
 def opened(plugged: Plugged) -> Iterator[InputDevice]:
+    """Open the input device that has the controller's sticks, triggers and buttons."""
     with InputDevice(bound(plugged).inputs()[plugged.identity.name]) as device:
         yield device
 

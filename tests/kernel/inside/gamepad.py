@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import pytest
 
 from common.clock import MonotonicClock
+from common.errors import DeviceError, NoDeviceError
 from feelahead.both_sides.processes import SideProcess
 from operator_side.controller.feel import FREE_TRIGGER, RELEASED, Feel, Rumble
 from operator_side.controller.port import OpenController
@@ -90,6 +91,25 @@ def test_stiffness_at_the_trigger_shakes_its_motor_which_stops_by_itself(plugged
     feels(Feel(rumble=Rumble(right=1.0)), 0.0, FULL)
     pad.device.close()
     wait_until("closing stops it", lambda: rumble(plugged) == STILL)
+
+
+def test_unplugged_it_is_gone_and_found_when_it_is_back(plugged: Plugged, pad: OpenController) -> None:
+    plugged.unplug()
+
+    def gone() -> bool:
+        try:
+            pad.device.read(0.0)
+        except DeviceError as error:
+            return "the gamepad is gone" in str(error)
+        return False
+
+    wait_until("reading says that it is gone", gone)
+    with pytest.raises(NoDeviceError, match="no gamepad with two sticks"):
+        find_pad(None)
+    bound(plugged)
+    found = find_pad(ADDRESS)
+    assert found.device.read(0.0) is not None
+    found.device.close()
 
 
 @pytest.mark.parametrize("ends", [signal.SIGSTOP, signal.SIGKILL], ids=["hanging", "killed"])

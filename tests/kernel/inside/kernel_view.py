@@ -11,6 +11,8 @@ from operator_side.dualsense.uhid.controller import BUS, UhidIdentity
 
 
 class KernelView:
+    """HID device of a controller, as a folder under /sys."""
+
     def __init__(self, folder: Path) -> None:
         self.folder = folder
 
@@ -21,6 +23,7 @@ class KernelView:
         return link.resolve().name if link.exists() else None
 
     def inputs(self) -> dict[str, Path]:
+        """Return the device file of each input device, by the input device's name."""
         found = {}
         for folder in sorted(self.folder.glob("input/input*")):
             events = sorted(folder.glob("event*"))
@@ -29,6 +32,7 @@ class KernelView:
         return found
 
     def hidraw(self) -> Path | None:
+        """Return the hidraw device file, if there is one."""
         found = sorted(self.folder.glob("hidraw/hidraw*"))
         return Path("/dev") / found[0].name if found else None
 
@@ -41,14 +45,17 @@ def seen_device(identity: UhidIdentity) -> KernelView | None:
 
 
 ABS_X, ABS_Y, ABS_Z, ABS_RX, ABS_RY, ABS_RZ, ABS_HAT0X, ABS_HAT0Y = 0, 1, 2, 3, 4, 5, 16, 17
-BTN_SOUTH, BTN_TL = 0x130, 0x136
+BTN_SOUTH, BTN_TL, BTN_TOUCH = 0x130, 0x136, 0x14A
 
 _GET_AXIS: Final = 0x80184540  # EVIOCGABS(0), a struct input_absinfo
 _GET_KEYS: Final = 0x80604518  # EVIOCGKEY(96)
 _AXIS = struct.Struct("=6i")
+_KEY_BYTES = 96
 
 
 class InputDevice:
+    """An input device, opened as a file /dev/input/event*."""
+
     def __init__(self, path: Path) -> None:
         self._descriptor = os.open(path, os.O_RDWR)
 
@@ -59,6 +66,7 @@ class InputDevice:
         os.close(self._descriptor)
 
     def axes(self, *codes: int) -> tuple[int, ...]:
+        """Return the present values of the absolute axes `codes`."""
         return tuple(self._axis(code) for code in codes)
 
     def _axis(self, code: int) -> int:
@@ -67,6 +75,7 @@ class InputDevice:
         return int(_AXIS.unpack(content)[0])
 
     def is_down(self, code: int) -> bool:
-        keys = bytearray(96)
+        """Return whether a key is pressed."""
+        keys = bytearray(_KEY_BYTES)
         fcntl.ioctl(self._descriptor, _GET_KEYS, keys)
         return bool(keys[code // 8] >> code % 8 & 1)

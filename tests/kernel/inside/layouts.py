@@ -4,10 +4,11 @@ import random
 
 import pytest
 
-from common.errors import DeviceError
+from common.errors import DeviceError, NoDeviceError
 from operator_side.evdev.pad import BUTTONS, find_pad
 from tests.kernel.inside.uinput_pad import ABS, KEY, UinputPad
 
+_KEYS = range(0x130, 0x13F)
 _STICKS = dict.fromkeys((0, 1, 2, 5), (0, 65535))
 _PEDALS = dict.fromkeys((9, 10), (0, 1023))
 _HATS = dict.fromkeys((16, 17), (-1, 1))
@@ -16,7 +17,7 @@ _L1, _EAST = 0x136, 0x131
 
 def test_whatever_the_queue_drops_each_read_gives_what_the_kernel_knows() -> None:
     generator = random.Random(3)  # noqa: S311  # repeatable, not secret
-    with UinputPad("Xbox by Bluetooth", range(0x130, 0x13F), _STICKS | _PEDALS | _HATS) as theirs:
+    with UinputPad("Xbox by Bluetooth", _KEYS, _STICKS | _PEDALS | _HATS) as theirs:
         pad = find_pad(None)
         assert pad.name.startswith("Xbox by Bluetooth at /dev/input/event")
         state = pad.device.read(0.0)
@@ -38,3 +39,13 @@ def test_whatever_the_queue_drops_each_read_gives_what_the_kernel_knows() -> Non
     with pytest.raises(DeviceError, match="gamepad is gone"):
         pad.device.read(0.0)
     pad.device.close()
+
+
+def test_what_is_refused_is_named_with_its_axes() -> None:
+    axes = dict.fromkeys((0, 1, 3, 4), (-32767, 32767)) | _HATS
+    with UinputPad("Switch Pro", _KEYS, axes), pytest.raises(NoDeviceError) as caught:
+        find_pad(None)
+    text = str(caught.value)
+    assert "; Switch Pro at /dev/input/event" in text
+    assert "no triggers with a travel, only buttons" in text
+    assert "its axes: ABS_X, ABS_Y, ABS_RX, ABS_RY, ABS_HAT0X, ABS_HAT0Y" in text

@@ -11,13 +11,15 @@ from feelahead.both_sides.processes import SideProcess
 from operator_side.controller.state import Button
 from operator_side.dualsense.reports.transport import Transport
 from operator_side.dualsense.simulated.trigger_model import NORMAL_FINGER_FORCE_N
-from tests.helpers.machines.waiting import stays, wait_until
+from tests.helpers.machines.waiting import LIMIT_S, stays, wait_until
 from tests.kernel.inside.armless_robot import ArmlessRobot
 from tests.kernel.inside.plugged import Plugged, Variant
 
 _HEALTHY_S = 0.7
 """Seconds for which commands are sent before arming: longer than the robot side demands"""
+_PRESSED_S = 0.3
 _HOLD_TO_RUN = Button.L1
+_ARM = Button.OPTIONS
 
 
 class Desk:
@@ -31,6 +33,7 @@ class Desk:
         self.controller = "unknown"
 
     def note(self, part: str) -> None:
+        """Wait until the operator side has printed a note that contains `part`."""
 
         def said() -> bool:
             self._listen()
@@ -39,6 +42,7 @@ class Desk:
         wait_until(f"a note: {part}", said, instead=lambda: self.notes)
 
     def controller_lost(self) -> bool:
+        """Return whether the operator side's newest status reports a lost controller."""
         self._listen()
         return self.controller == "lost"
 
@@ -88,10 +92,10 @@ def arm_and_move(desk: Desk) -> None:
         hold(plugged, _HOLD_TO_RUN)
         time.sleep(_HEALTHY_S)
         if robot.state != "armed":
-            hold(plugged, _HOLD_TO_RUN, Button.OPTIONS)
+            hold(plugged, _HOLD_TO_RUN, _ARM)
         else:
             hold(plugged, _HOLD_TO_RUN, r2_n=NORMAL_FINGER_FORCE_N)
-        time.sleep(0.3)
+        time.sleep(_PRESSED_S)
         return robot.moving
 
     wait_until("the arm would move", moving, instead=lambda: robot.state)
@@ -131,12 +135,23 @@ def test_gone_in_mid_run_the_robot_stops_and_stays_disarmed(desk: Desk, dongle: 
     stays("the robot moves again by itself", lambda: robot.state == "disarmed" and not robot.moving)
 
 
-@pytest.mark.parametrize("ends", [signal.SIGSTOP, signal.SIGKILL], ids=["hanging", "killed"])
-def test_its_watchdog_releases_stiff_triggers(desk: Desk, ends: signal.Signals) -> None:
+def test_stopped_with_stiff_triggers_its_watchdog_releases_them(desk: Desk) -> None:
     arm_and_pull(desk)
-    os.kill(desk.operator.process_id, ends)
+    os.kill(desk.operator.process_id, signal.SIGSTOP)
     try:
-        wait_until("the triggers are released", lambda: desk.plugged.ask(lambda controller: controller.released))
-        wait_until("the robot stops", lambda: desk.robot.state == "disarmed" and not desk.robot.moving)
+        released_and_stopped(desk)
     finally:
         os.kill(desk.operator.process_id, signal.SIGCONT)
+
+
+def test_killed_with_stiff_triggers_its_watchdog_releases_them(desk: Desk) -> None:
+    arm_and_pull(desk)
+    os.kill(desk.operator.process_id, signal.SIGKILL)
+    assert desk.operator.wait(LIMIT_S) == -signal.SIGKILL
+    released_and_stopped(desk)
+
+
+def released_and_stopped(desk: Desk) -> None:
+    """Wait until the triggers are free and the robot side is disarmed."""
+    wait_until("the triggers are released", lambda: desk.plugged.ask(lambda controller: controller.released))
+    wait_until("the robot stops", lambda: desk.robot.state == "disarmed" and not desk.robot.moving)

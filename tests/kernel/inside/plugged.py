@@ -22,11 +22,14 @@ ADDRESS: Final = "01:02:03:04:05:06"
 
 @dataclass(frozen=True, slots=True)
 class Variant:
+    """Model of a controller, and its transport: USB or Bluetooth."""
+
     transport: Transport
     model: Model = Model.DUALSENSE
 
     @property
     def name(self) -> str:
+        """Name of model and transport, as messages show it."""
         return f"{self.model.title} on {self.transport.value}"
 
 
@@ -98,6 +101,7 @@ class Plugged:
         return answers[0]
 
     def hands_off(self) -> None:
+        """Release triggers, sticks and buttons."""
 
         def let_go(controller: SimulatedDualSense) -> None:
             controller.set_sticks()

@@ -13,6 +13,8 @@ KEY, ABS, _FF, _RUMBLE = 1, 3, 0x15, 0x50
 
 
 class UinputPad:
+    """Gamepad with rumble, whose axes and keys a test moves."""
+
     def __init__(self, name: str, keys: Iterable[int], axes: Mapping[int, tuple[int, int]]) -> None:
         """axes: least and most value by code."""
         self._file = os.open("/dev/uinput", os.O_RDWR)
@@ -36,5 +38,6 @@ class UinputPad:
         os.close(self._file)
 
     def send(self, *events: tuple[int, int, int]) -> None:
+        """Send events (kind, code, value) as one packet."""
         for event in (*events, (0, 0, 0)):
             os.write(self._file, _EVENT.pack(0, 0, *event))
