@@ -100,6 +100,11 @@ def layout_of(keys: set[int], axes: Mapping[int, Axis], *, rumbles: bool) -> Lay
     return f"no {', no '.join(lacks)}; its axes: {names(sorted(axes)) or 'none'}{without_range}"
 
 
+def is_fresh(axes: Mapping[int, Axis]) -> bool:
+    """Return whether no axis that may be a trigger or a stick has moved yet: the kernel says 0 wherever it rests."""
+    return not any(axes[code].value for code in (Z, RX, RY, RZ) if code in axes)
+
+
 def names(codes: Iterable[int]) -> str:
     """Return the kernel's names of axes, separated by commas."""
     return ", ".join(f"ABS_{_NAMES.get(code, f'{code:#x}')}" for code in codes)

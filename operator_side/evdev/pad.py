@@ -16,7 +16,7 @@ from common.errors import DeviceError, NoDeviceError
 from operator_side.controller.feel import MAX_STRENGTH, Feel, Strengths, met
 from operator_side.controller.port import OpenController, checked_address
 from operator_side.controller.state import Battery, BatteryState, Button, ControllerState
-from operator_side.evdev.layout import HAT_X, HAT_Y, Layout, is_controller, layout_of
+from operator_side.evdev.layout import HAT_X, HAT_Y, Layout, is_controller, is_fresh, layout_of
 from operator_side.evdev.node import (
     ABS,
     FF,
@@ -95,7 +95,8 @@ class EvdevPad:
             self.name = self._node.text(GET_NAME)
             self.address = _address(self._node.text(GET_UNIQUE))
             self._axes = {code: self._node.axis(code) for code in axes} if self.is_controller else {}
-            found = layout_of(keys, self._axes, rumbles=FF_RUMBLE in effects)
+            self._keys, self._rumbles, self._fresh = keys, FF_RUMBLE in effects, is_fresh(self._axes)
+            found = layout_of(keys, self._axes, rumbles=self._rumbles)
             self.layout = found if isinstance(found, Layout) else None
             """Axes of sticks and triggers; None if the device cannot be used."""
             self.lacks = "" if isinstance(found, Layout) else found
@@ -151,6 +152,7 @@ class EvdevPad:
                 missing = self._gap = True
             elif kind == SYN and code == SYN_REPORT:
                 missing, self._gap = missing or self._gap, False
+                self._look_again()
             elif self._gap:
                 continue
             elif kind == KEY and code in BUTTONS:
@@ -169,6 +171,16 @@ class EvdevPad:
                 self._values[code] = value
         self._down = self._node.bits(GET_KEYS) & BUTTONS.keys()
         self._changed = True
+        self._look_again()
+
+    def _look_again(self) -> None:
+        """Lay the axes out by where they rest, with the first values that come."""
+        if not self._fresh:
+            return
+        moved = {code: axis._replace(value=self._values.get(code, 0)) for code, axis in self._axes.items()}
+        found, self._fresh = layout_of(self._keys, moved, rumbles=self._rumbles), is_fresh(moved)
+        if isinstance(found, Layout):
+            self.layout = found
 
     def _made(self) -> ControllerState:
         if self.layout is None:

@@ -63,16 +63,17 @@ PADS: dict[str, tuple[Iterable[int], Axes, tuple[int, int], tuple[int, int]]] = 
 def test_each_known_layout_is_taken_and_read(name: str, moved_before: bool) -> None:
     keys, spans, right, triggers = PADS[name]
     node = FakeNode(keys, axes=spans)
-    if not moved_before and name != "DualShock 4 without its driver":
-        node.values = dict.fromkeys(
-            spans, 0
-        )  # The kernel's value of an axis that has not moved since it was plugged in.
+    if not moved_before:
+        # The kernel's value of an axis that has not moved since it was plugged in.
+        node.values = dict.fromkeys(spans, 0)
     pad = EvdevPad(node.descriptor, node.ioctl)
     assert pad.is_pad, pad.lacks
     state = state_of(pad)
     assert (state.l2, state.r2, state.pressed) == (0.0, 0.0, frozenset())
     assert max(map(abs, state.left_stick + state.right_stick)) < 0.005
     middle = [sum(spans[code][:2]) // 2 for code in triggers]
+    if not moved_before:  # A first report moves all axes to where they rest.
+        node.happen(*((ABS, code, span[2]) for code, span in spans.items() if span[2]))
     node.happen((ABS, 0, spans[0][0]), (ABS, right[1], spans[right[1]][0]), (ABS, triggers[0], middle[0]))
     node.happen((ABS, triggers[1], spans[triggers[1]][1]), (ABS, 1, spans[1][1]), (ABS, right[0], spans[right[0]][1]))
     state = state_of(pad)
