@@ -73,19 +73,19 @@ def given_fields(arguments: Sequence[str], settings_type: type) -> frozenset[str
     return frozenset(said & set(hints))
 
 
-def load_toml(path: Path, settings_type: type[Settings], elsewhere: str = "") -> Settings:
+def load_toml(path: Path, settings_type: type[Settings], elsewhere: str = "", flag: str = "--config") -> Settings:
     """Read `settings_type` from a TOML file; raises ConfigurationError, which names file, key and valid values."""
     try:
         content = read_toml(path, _LARGEST_CONFIG_BYTES)
     except OSError as error:
-        raise ConfigurationError(f"--config {path}: cannot be read: {error.strerror}") from error
+        raise ConfigurationError(f"{flag} {path}: cannot be read: {error.strerror}") from error
     except ValueError as error:
-        raise ConfigurationError(f"--config {path}: {error}") from error
-    _refuse_unknown_keys(content, settings_type, path, "", elsewhere)
+        raise ConfigurationError(f"{flag} {path}: {error}") from error
+    _refuse_unknown_keys(content, settings_type, f"{flag} {path}", "", elsewhere)
     try:
         return msgspec.convert(content, settings_type, dec_hook=_from_toml)
     except msgspec.ValidationError as error:
-        raise ConfigurationError(f"--config {path}: {explain(str(error), content, settings_type)}") from error
+        raise ConfigurationError(f"{flag} {path}: {explain(str(error), content, settings_type)}") from error
 
 
 def run_command(program: str, command: Callable[[Sequence[str]], int]) -> None:
@@ -135,17 +135,16 @@ def _config_path(arguments: Sequence[str]) -> str | None:
     return path
 
 
-def _refuse_unknown_keys(content: dict[str, Any], settings_type: Any, path: Path, prefix: str, elsewhere: str) -> None:
+def _refuse_unknown_keys(content: dict[str, Any], settings_type: Any, file: str, prefix: str, elsewhere: str) -> None:
     # A file that a file names is not read.
     hints = {name: hint for name, hint in get_type_hints(settings_type).items() if name != "config"}
     for key, value in content.items():
         if key not in hints:
             raise ConfigurationError(
-                f"--config {path}: unknown key {_shortened(prefix + key)!r}; valid: {', '.join(sorted(hints))}"
-                + elsewhere
+                f"{file}: unknown key {_shortened(prefix + key)!r}; valid: {', '.join(sorted(hints))}" + elsewhere
             )
         if isinstance(value, dict) and dataclasses.is_dataclass(hints[key]):
-            _refuse_unknown_keys(value, hints[key], path, f"{prefix}{key}.", elsewhere)
+            _refuse_unknown_keys(value, hints[key], file, f"{prefix}{key}.", elsewhere)
 
 
 def _one_line(box: str, program: str, settings_type: type) -> str:

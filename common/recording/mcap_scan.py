@@ -36,10 +36,8 @@ class Scan:
     names: dict[int, str] = field(default_factory=dict)
     """Topic of each channel"""
     parts: list[Part] = field(default_factory=list)
-    topics: set[str] = field(default_factory=set)
-    """Topics with messages"""
-    end_ns: int = 0
-    """Newest stamp"""
+    stamps_ns: dict[str, tuple[int, int]] = field(default_factory=dict)
+    """Oldest and newest stamp of each topic with messages"""
     whole: bool = False
     """Whether the file was finished"""
     damaged: bool = False
@@ -84,11 +82,12 @@ class Scan:
             elif isinstance(one, Message):
                 if one.channel_id not in self.names:
                     self._refuse(f"has messages in channel {one.channel_id}, which nothing before them describes")
-                self.topics.add(self.names[one.channel_id])
+                topic, stamp_ns = self.names[one.channel_id], one.log_time
+                first_ns, last_ns = self.stamps_ns.get(topic, (stamp_ns, stamp_ns))
+                self.stamps_ns[topic] = min(first_ns, stamp_ns), max(last_ns, stamp_ns)
                 stamps.append(one.log_time)
         if stamps:
             self._unchecked |= not (chunk and record.uncompressed_crc)
-            self.end_ns = max(self.end_ns, *stamps)
             self._add(Part(min(stamps), begin, end), joins=not chunk)
 
     def _add(self, part: Part, *, joins: bool) -> None:

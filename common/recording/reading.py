@@ -14,10 +14,12 @@ from typing import Any, Final, NamedTuple
 from common.errors import ConfigurationError
 from common.recording.mcap_scan import Part, Scan, messages_in
 from common.recording.packages import require_packages
-from common.recording.topics import FACTS_TOPIC, TYPES
-from common.recording.wire import BINARY, FORMAT, PROFILE
+from common.recording.topics import OURS
+from common.recording.wire import FORMAT, PROFILE
 
 _SIDES: Final = {f"{PROFILE}.{side}": side for side in ("robot", "operator")}
+_HOUR_NS: Final = 3_600_000_000_000
+_LONGEST_NS: Final = 24 * _HOUR_NS
 
 
 class Message(NamedTuple):
@@ -43,9 +45,9 @@ class Recording:
     topics: Collection[str]
     """Topics with messages"""
     began_ns: int
-    """Oldest stamp, in nanoseconds on the wall clock"""
+    """Oldest stamp of our own topics, in nanoseconds on the wall clock"""
     end_ns: int
-    """Newest stamp"""
+    """Newest stamp of them"""
     _parts: tuple[Part, ...]
     """Parts of the file by their oldest stamps"""
     _names: Mapping[int, str]
@@ -102,10 +104,15 @@ def open_recording(path: Path) -> Recording:
         why = "holds no messages" if scan.whole else "ends before its first complete second"
         why = "is damaged in its first second" if scan.damaged else why
         raise ConfigurationError(f"{path}: {why}; valid: a file that --record made in a second or longer")
+    # Another tool's messages in the file may have another clock.
+    stamps_ns = [of_topic for topic, of_topic in scan.stamps_ns.items() if topic in OURS] or [*scan.stamps_ns.values()]
+    began_ns, end_ns = min(first for first, _ in stamps_ns), max(last for _, last in stamps_ns)
+    if end_ns - began_ns > _LONGEST_NS:
+        hours, most = (end_ns - began_ns) / _HOUR_NS, _LONGEST_NS // _HOUR_NS
+        raise ConfigurationError(f"{path}: spans {hours:.0f} h by its stamps; valid: at most {most} h, by one clock")
     parts = tuple(sorted(scan.parts))
-    return Recording(
-        path, headers, scan.whole, scan.damaged, scan.topics, parts[0].start_ns, scan.end_ns, parts, scan.names
-    )
+    topics = scan.stamps_ns.keys()
+    return Recording(path, headers, scan.whole, scan.damaged, topics, began_ns, end_ns, parts, scan.names)
 
 
 def _headers(scan: Scan) -> dict[str, Mapping[str, Any]]:
@@ -120,7 +127,7 @@ def _headers(scan: Scan) -> dict[str, Mapping[str, Any]]:
     why, valid = "holds nothing that feelahead recorded", "a file that --record made in a second or longer"
     if scan.damaged:
         why, valid = "its header is damaged", "an undamaged file that --record made"
-    elif not scan.topics.isdisjoint({*TYPES, *BINARY, FACTS_TOPIC}):
+    elif not OURS.isdisjoint(scan.stamps_ns):
         why = f"lacks the metadata {' and '.join(_SIDES)}, which another tool has left out"
         valid = "with one at least (mcap filter --include-metadata)"
     raise ConfigurationError(f"{scan.path}: {why}; valid: {valid}")

@@ -13,6 +13,7 @@ import msgspec
 from common.episode import EpisodeMark
 from common.protocol.messages import MotionCommand, StiffnessUpdate, Telemetry
 from common.protocol.view_messages import EnlargementTerms
+from common.recording.wire import BINARY
 from common.status.statuses import OperatorStatus, RobotStatus
 
 FACTS_TOPIC: Final = "/operator/facts"
@@ -125,6 +126,8 @@ TYPES: Final[Mapping[str, type[msgspec.Struct]]] = {
     "/operator/status": _named(OperatorStatus, Moment),
 }
 """Type of the messages of each JSON topic but FACTS_TOPIC"""
+OURS: Final = frozenset({*TYPES, *BINARY, FACTS_TOPIC})
+"""Topics of nobody else, whose stamps are the run's times; also /log, /tf, /scene and /camera/... are recorded"""
 
 
 def json_schema(topic: str, kind: type[msgspec.Struct]) -> dict[str, Any]:

@@ -15,6 +15,7 @@ from common.emulation.spec import Direction, Stream, unused_clauses
 from common.errors import ConfigurationError
 from common.files.output_file import write_json
 from common.recording.side import Recorder
+from feelahead.both_sides.settings_files import check_settings_files
 from feelahead.both_sides.summary import merge_summaries, read_summary
 from feelahead.commands.demo.compare import compare
 from feelahead.commands.demo.page import KeptPage
@@ -36,6 +37,7 @@ def demo(arguments: Sequence[str]) -> int:
     settings = parse_settings(DemoSettings, "feelahead demo", arguments, _ELSEWHERE)
     if (complaint := too_slow(settings)) is not None:
         raise ConfigurationError(complaint)
+    check_settings_files(settings.robot_config, settings.operator_config)
     given = given_fields(arguments, DemoSettings)
     if settings.compare:
         return compare(settings, given)

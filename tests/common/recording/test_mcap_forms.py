@@ -55,6 +55,15 @@ def test_every_form_reads_the_same(recorded: Path, tmp_path: Path, form: str) ->
         assert inputs == [one for one in messages if one.topic == f"/{side}/inputs"]
 
 
+@pytest.mark.parametrize("form", ["zstd", "without chunks"])
+def test_another_tools_clock_is_not_the_runs(recorded: Path, tmp_path: Path, form: str) -> None:
+    other = tmp_path / "other.mcap"
+    other.write_bytes(rewritten(recorded, notes_ns=0, **FORMS[form]))
+    run, found = open_recording(recorded), open_recording(other)
+    assert (found.began_ns, found.end_ns) == (run.began_ns, run.end_ns)
+    assert "/notes" in found.topics
+
+
 @pytest.mark.parametrize("form", ["zstd", "without chunks", "shuffled, without chunks", "newest first"])
 def test_a_form_that_is_cut_off_reads_as_what_is_left(recorded: Path, tmp_path: Path, form: str) -> None:
     content, other = rewritten(recorded, **{**FORMS[form], **BARE, "chunk_size": 3000}), tmp_path / "other.mcap"
@@ -76,7 +85,9 @@ def test_a_form_that_is_cut_off_reads_as_what_is_left(recorded: Path, tmp_path: 
     assert lengths[-1] == 0
 
 
-def of_another_tool(topic: str, *, metadata: bool = False, messages: int = 1, times: int = 1) -> bytes:
+def of_another_tool(
+    topic: str, *, metadata: bool = False, messages: int = 1, times: int = 1, every_h: int = 0
+) -> bytes:
     output = io.BytesIO()
     writer: Any = Writer(output)
     writer.start()
@@ -84,7 +95,7 @@ def of_another_tool(topic: str, *, metadata: bool = False, messages: int = 1, ti
         writer.add_metadata("feelahead.robot", {"format": str(FORMAT), "epoch": str(epoch)})
     channel_id = writer.register_channel(topic, "json", 0)
     for number in range(messages):
-        writer.add_message(channel_id, number, b"{}", number)
+        writer.add_message(channel_id, 3600 * 10**9 * every_h * number, b"{}", number)
     writer.finish()
     return output.getvalue()
 
@@ -137,6 +148,10 @@ REFUSED: dict[str, tuple[Callable[[Path], bytes], str]] = {
     "two runs in one": (
         lambda _: of_another_tool("/stiffness", metadata=True, times=2),
         "holds two runs of the robot side",
+    ),
+    "of two clocks": (
+        lambda _: of_another_tool("/stiffness", metadata=True, messages=2, every_h=25),
+        "spans 25 h by its stamps",
     ),
     "compressed otherwise": (other_compression, "is compressed by 'br!'; valid: zstd, lz4 or none"),
     "damaged, without chunks": (unchunked_and_flipped, "its checksum"),

@@ -51,6 +51,14 @@ def test_only_what_was_said_goes_over_the_sides_own_files(tmp_path: Path) -> Non
     assert not [flag for flag in operator if flag.startswith(unsaid)]
 
 
+@pytest.mark.parametrize("flag", ["--robot-config", "--operator-config"])
+def test_a_sides_file_is_checked_before_a_side_is_started(flag: str, tmp_path: Path) -> None:
+    config = tmp_path / "side.toml"
+    config.write_text("nothing = 1")
+    with pytest.raises(ConfigurationError, match=f"^{flag} .*unknown key 'nothing'; valid: "):
+        demo([flag, str(config)])
+
+
 def test_given_flags_are_passed_on_to_the_side_that_takes_them_even_if_default(tmp_path: Path) -> None:
     given = "--seed", "0", "--link=delay 5ms", "--probability", "0.99", "--haptics", "--realtime", "--scene", "wall"
     robot, operator = passed_on(*given)

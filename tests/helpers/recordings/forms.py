@@ -33,13 +33,15 @@ def rewritten(
     channels: int = 1,
     schemas: bool = True,
     metadata_last: bool = False,
+    notes_ns: int | None = None,
     finish: Callable[[bytes], bytes] = bytes,
     **options: Any,
 ) -> bytes:
     """Write the messages and metadata of the file `source` again.
 
     order: key by which messages are sorted. shuffled: seed of a random order. channels: number of channels of each
-    topic, which take turns. finish: change of the written bytes. options: the writer's.
+    topic, which take turns. notes_ns: stamp of a message of another tool's topic. finish: change of the written bytes.
+    options: the writer's.
     """
     with source.open("rb") as file:
         records = list(StreamReader(file).records)
@@ -65,6 +67,8 @@ def rewritten(
     for number, one in enumerate(messages):
         channel_id = ids[one.channel_id][number % channels]
         writer.add_message(channel_id, one.log_time, one.data, one.publish_time, one.sequence)
+    if notes_ns is not None:
+        writer.add_message(writer.register_channel("/notes", "json", 0), notes_ns, b"{}", notes_ns)
     if metadata_last:
         _describe(writer, metadata)
     writer.finish()
