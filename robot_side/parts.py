@@ -28,6 +28,7 @@ from robot_side.drivers.mujoco.hand.gripper_cover import GripperCover
 from robot_side.drivers.mujoco.hand.gripper_measurement import GripperTravel
 from robot_side.drivers.mujoco.joint_reference import MotionLimits
 from robot_side.drivers.mujoco.kinematics import MujocoKinematics
+from robot_side.drivers.mujoco.model_enums import JointKind
 from robot_side.drivers.mujoco.robot_model import joint_names
 from robot_side.drivers.mujoco.scene import Scene, load_scene
 from robot_side.drivers.mujoco.true_contact import TrueContact
@@ -133,7 +134,8 @@ def build_parts(
     # Before the first tick, as a search for spheres takes far longer than one.
     first = _as_loaded(scene, scene.roles) if settings.objects is None else perceived([], [], 0.0)
     held_covers = HeldCovers(first, settings.cover_m, scene.never_held, searching)
-    joint_limits = limits.of_joints(arm.joint_count, *ends_rad)
+    slides = scene.model.jnt_type[scene.robot.arm_joints] == JointKind.SLIDE
+    joint_limits = limits.of_joints(arm.joint_count, *ends_rad, slides)
     surroundings = Surroundings()
     prediction, prediction_note = _prediction_errors(settings, scene)
     errors = settings.uncertainty(prediction)

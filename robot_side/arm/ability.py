@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from common.arrays import FloatArray
+from common.arrays import BoolArray, FloatArray
 from robot_side.arm.port import GripperPose
 from robot_side.arm.resolved_rate import refuse, resolve
 from robot_side.compiled.kernel import BOOL, FLOAT64, compiled, input_array, output_array
@@ -30,6 +30,9 @@ class JointLimits:
     lower_rad: FloatArray | None = None
     """Lower end of each joint's range; None if all are unknown or without ends"""
     upper_rad: FloatArray | None = None
+
+    slides: BoolArray | bool = False
+    """Whether each joint slides"""
 
     @cached_property
     def ends_rad(self) -> tuple[FloatArray, FloatArray]:

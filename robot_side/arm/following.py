@@ -19,8 +19,8 @@ from robot_side.arm.joint_tracking import CLOCK, TRACK, Fault, track
 from robot_side.arm.port import ArmState, GripperPose
 
 NOTICED_RAD: Final = 0.02
-"""Way that a joint stays behind or goes beyond, from which it is noticed; six standard deviations of readings are
-added"""
+"""Way that a joint stays behind or goes beyond, from which it is noticed: more than real arms' dry friction holds back.
+It counts at `LEVER_M` where a joint slides; six standard deviations of readings are added"""
 STOPS_S: Final = {Fault.STILL: 0.5, Fault.FAR: 0.5, Fault.ASTRAY: 0.25}
 """Times, in s, after which faults stop the arm, once they were noticed"""
 _LIMITS_S: Final[FloatArray] = np.array([STOPS_S.get(fault, math.inf) for fault in Fault])
@@ -48,8 +48,8 @@ class Following:
         """(n,) velocities beyond the expected ones, of joints that nothing in their way explains; None for no such"""
         self._limits, self._still = limits, np.zeros(count)
         self._names = [f"joint {j + 1}" + (f" ({names[j][:40]})" if j < len(names) else "") for j in range(count)]
-        self._limit_rad = NOTICED_RAD + 6.0 * sigma_rad
         self._tracks, self._clock = np.zeros(count, TRACK), np.zeros(1, CLOCK)
+        self._tracks["limit"] = NOTICED_RAD * np.where(limits.slides, LEVER_M, 1.0) + 6.0 * sigma_rad
         self._known = np.zeros(count, dtype=np.int64)
         self._told, self._worst = np.zeros(count, dtype=bool), Fault.NONE
         self._noticed: Counter[str] = Counter()
@@ -79,7 +79,7 @@ class Following:
         command = self._still if commanded_rad_s is None else commanded_rad_s
         limits, given = self._limits, (command, state.joint_positions_rad, loads)
         ends = *limits.ends_rad, limits.acceleration_rad_s2
-        if track(self._tracks, self._clock, *given, *ends, time_s, late_s, self._limit_rad):
+        if track(self._tracks, self._clock, *given, *ends, time_s, late_s):
             self._judge(state.joint_loads_nm is None, touches, time_s)
         elif self.text is not None:
             self._forget()

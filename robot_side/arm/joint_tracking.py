@@ -2,8 +2,8 @@
 
 Arms follow late, and not all alike. So what to expect is an interval: of the velocities commanded within `LAG_S` and
 twice the states' lateness, which narrows no faster than the joints' limits of acceleration allow. The way that a joint
-misses, or makes beyond this interval and an allowance, is added up and slowly forgotten (a cumulative sum; Page, 1954).
-A joint that was behind may catch up.
+misses, or makes beyond this interval and an allowance, is added up (a cumulative sum; Page, 1954). The allowance is a
+share of the way, so that the sum is forgotten by motion, and hardly by time. A joint that was behind may catch up.
 """
 
 import math
@@ -22,22 +22,23 @@ _SLOTS: Final = 20
 _LOST_S: Final = 0.1
 """Time between two states, in s, after which tracking begins anew"""
 _ALLOWED: Final = 0.2
-_ALLOWED_RAD_S: Final = 0.03
-"""Deviations from the expected velocity that count as none: a share of it, and at least this velocity"""
-_FORGOTTEN_S: Final = 1.0
+"""Share of the expected way that a joint may miss or make beyond"""
+_CREEP_S: Final = 4.0
+"""Time in which a joint may creep by the way that is noticed; time constant, in s, of what is forgotten without motion
+"""
 _SPEED_S: Final = 0.1
 _RECENT_S: Final = 0.2
 _LOAD_S: Final = 0.03
 _USUAL_LOAD_S: Final = 1.0
-"""Time constants, in s, of the summed way, the measured velocity, a joint's recent share, its load and usual load"""
+"""Time constants, in s, of the measured velocity, a joint's recent share, its load and usual load"""
 _STILL: Final = 0.25
 _NO_LONGER_STILL: Final = 0.35
 _FOLLOWS: Final = 0.85
 """Shares of its recent command: below the first a joint counts as still, up to the second it remains so, and from the
 last it follows again"""
-_DRIVEN_RAD_S: Final = 0.1
-"""Least expected velocity at which a still joint can stop the arm"""
-_NEAR_END_RAD: Final = 0.1
+_JUDGED: Final = 0.25
+"""Least recent command by which a joint is judged; a share of the way that is noticed, as the next"""
+_NEAR_END: Final = 5.0
 """Distance from the end of its range, beyond what it needs to stop, within which a joint may stand"""
 _LEAST_LOAD_NM: Final = 0.1
 _EXCUSED_S: Final = 0.3
@@ -63,7 +64,7 @@ TRACK: Final = np.dtype(
             (name, np.float64)
             for name in (
                 *("position", "least", "greatest", "next_least", "next_greatest", "toward", "short", "up", "down"),
-                *("speed", "told", "made", "lasts", "held", "load", "usual_load", "error"),
+                *("speed", "told", "made", "lasts", "held", "load", "usual_load", "error", "limit"),
             )
         ),
         ("least_told", np.float64, (_SLOTS,)),
@@ -72,9 +73,9 @@ TRACK: Final = np.dtype(
 )
 """Record of a joint, in rad and s. held: time for which its load still explains its fault; 0 if it does not. least,
 greatest: expected velocity; next_least, next_greatest: what these approach. toward: last direction of that velocity.
-short: way that the joint stays behind. up, down: ways beyond. told, made: recent commanded and measured ways along
-`toward`. lasts: time for which a fault other than SLOW lasts, unless held. error: measured velocity beyond the expected
-ones, while at fault and not held. least_told, greatest_told: bounds of the commands in each time slot."""
+limit: way that is noticed. short: way that the joint stays behind. up, down: ways beyond. told, made: recent commanded
+and measured ways along `toward`. lasts: time for which a fault other than SLOW lasts, unless held. error: measured
+velocity beyond the expected ones, while at fault and not held. least_told, greatest_told: bounds of the commands in each time slot."""
 CLOCK: Final = np.dtype([("slot", np.int64), ("faults", np.int64), ("time", np.float64)])
 """Record of the tracking: number of the newest time slot, number of joints at fault, time of the newest state"""
 
@@ -110,7 +111,7 @@ def _expect(
         for k in range(window):
             slot = (clock.slot - k) % _SLOTS
             least, greatest = min(least, one.least_told[slot]), max(greatest, one.greatest_told[slot])
-        near = _NEAR_END_RAD + max(least * least, greatest * greatest) / (2.0 * fastest[j])
+        near = _NEAR_END * one.limit + max(least * least, greatest * greatest) / (2.0 * fastest[j])
         if one.position < lower[j] + near:
             greatest = max(greatest, 0.0)
         if one.position > upper[j] - near:
@@ -133,33 +134,33 @@ def _add_up(one: Any, moved: float, since: float) -> None:
         one.told = one.made = 0.0
         if toward != 0.0:
             one.toward, one.short = toward, 0.0
-    kept = math.exp(-since / _FORGOTTEN_S)
-    wanted = (expected - max(_ALLOWED * expected, _ALLOWED_RAD_S)) * since
-    one.short = max(kept * one.short + wanted - one.toward * moved, 0.0)
-    most, least = max(one.greatest, 0.0), min(one.least, 0.0)
-    up = moved - (most + max(_ALLOWED * most, _ALLOWED_RAD_S)) * since
-    down = -moved - (max(-_ALLOWED * least, _ALLOWED_RAD_S) - least) * since
+    forgotten, creep = math.exp(-since / _CREEP_S), one.limit / _CREEP_S
+    kept = one.short if expected > 0.0 else forgotten * one.short
+    one.short = max(kept + (1.0 - _ALLOWED) * expected * since - one.toward * moved, 0.0)
+    most, least = max(one.greatest, 0.0), max(-one.least, 0.0)
+    up = moved - (most + max(_ALLOWED * most, creep)) * since
+    down = -moved - (least + max(_ALLOWED * least, creep)) * since
     if one.short > 0.0:  # what was behind may catch up
         up, down = (min(up, 0.0), down) if one.toward > 0.0 else (up, min(down, 0.0))
-    one.up, one.down = max(kept * one.up + up, 0.0), max(kept * one.down + down, 0.0)
-    recent = math.exp(-since / _RECENT_S)
+    one.up, one.down = max(forgotten * one.up + up, 0.0), max(forgotten * one.down + down, 0.0)
+    recent = math.exp(-since * min(1.0 / _RECENT_S, expected / one.limit))
     one.told = recent * one.told + expected * since
     one.made = recent * one.made + toward * moved
     one.speed += _approached(moved / since - one.speed, since, _SPEED_S)
 
 
 @building_block
-def _judge(one: Any, load: float, since: float, limit: float) -> None:
-    """Update a joint's fault. limit: way that is noticed."""
-    before, fault, expected = one.fault, Fault.NONE, max(one.least, -one.greatest, 0.0)
+def _judge(one: Any, load: float, since: float) -> None:
+    """Update a joint's fault."""
+    limit, before, fault = one.limit, one.fault, Fault.NONE
     side = 1.0 if one.up > one.down else -1.0
     off = side * (one.speed - (one.greatest if side > 0.0 else one.least))
     astray = before in (Fault.FAR, Fault.ASTRAY)
-    if (astray or max(one.up, one.down) > limit) and off > max(_ALLOWED * abs(one.speed), _ALLOWED_RAD_S):
+    if (astray or max(one.up, one.down) > limit) and off > max(_ALLOWED * abs(one.speed), 2.0 * limit / _CREEP_S):
         fault = Fault.FAR if side == one.toward else Fault.ASTRAY
     elif astray:
         one.up = one.down = 0.0
-    elif expected > 0.0 and one.made < _FOLLOWS * one.told and (before > 0 or one.short > limit):
+    elif one.told > _JUDGED * limit and one.made < _FOLLOWS * one.told and (before > 0 or one.short > limit):
         still = _NO_LONGER_STILL if before == Fault.STILL else _STILL
         fault = Fault.STILL if one.made < still * one.told else Fault.SLOW
     one.fault = fault
@@ -171,14 +172,14 @@ def _judge(one: Any, load: float, since: float, limit: float) -> None:
     one.held = max(one.held - since, 0.0) if fault > 0 else 0.0
     if fault > 0 and against * (one.load - one.usual_load) > _LEAST_LOAD_NM:
         one.held = _EXCUSED_S
-    stopping = fault in (Fault.FAR, Fault.ASTRAY) or (fault == Fault.STILL and expected >= _DRIVEN_RAD_S)
+    stopping = fault in (Fault.FAR, Fault.ASTRAY, Fault.STILL)
     one.lasts = one.lasts + since if stopping and fault == before and one.held == 0.0 else 0.0
     one.error = one.speed - min(max(one.speed, one.least), one.greatest) if fault > 0 and one.held == 0.0 else 0.0
 
 
 @compiled(
     *(record_array(TRACK), record_array(CLOCK), input_array(1), input_array(1), input_array(1)),
-    *(input_array(1), input_array(1), input_array(1), FLOAT64, FLOAT64, FLOAT64),
+    *(input_array(1), input_array(1), input_array(1), FLOAT64, FLOAT64),
     returns=INT64,
 )
 def track(
@@ -192,12 +193,11 @@ def track(
     fastest: FloatArray,
     time: float,
     late: float,
-    limit: float,
 ) -> int:
     """Take a tick's command (n,) and the newest state; return the number of joints at fault.
 
-    loads: (n,), or none. lower, upper, fastest: as in `_expect`. time, late: the state's time and lateness. limit: way
-    that is noticed.
+    loads: (n,), or none. lower, upper, fastest: as in `_expect`. time, late: the state's time and lateness. Each
+    track has its limit.
     """
     clock, newest = clocks[0], math.floor(time / _SLOT_S)
     since = time - clock.time
@@ -222,6 +222,6 @@ def track(
         one, moved = tracks[j], positions[j] - tracks[j].position
         one.position = positions[j]
         _add_up(one, moved, since)
-        _judge(one, loads[j] if loads.size > 0 else 0.0, since, limit)
+        _judge(one, loads[j] if loads.size > 0 else 0.0, since)
         clock.faults += 1 if one.fault > 0 else 0
     return int(clock.faults)

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Final
 import numpy as np
 from msgspec import Meta
 
-from common.arrays import FloatArray
+from common.arrays import BoolArray, FloatArray
 from common.limits import check_limits
 from robot_side.arm.ability import JointLimits
 from robot_side.compiled.kernel import BOOL, FLOAT64, building_block, compiled, input_array, record_array
@@ -55,11 +55,15 @@ class MotionLimits:
         check_limits(self)
 
     def of_joints(
-        self, count: int, lower_rad: FloatArray | None = None, upper_rad: FloatArray | None = None
+        self,
+        count: int,
+        lower_rad: FloatArray | None = None,
+        upper_rad: FloatArray | None = None,
+        slides: BoolArray | bool = False,
     ) -> JointLimits:
-        """Return these limits for `count` joints (n) with the ends of range lower_rad and upper_rad (n,)."""
+        """Return these limits for `count` joints (n); the other arguments are as in `JointLimits`."""
         velocity, acceleration = np.full(count, self.velocity_rad_s), np.full(count, self.acceleration_rad_s2)
-        return JointLimits(velocity, acceleration, lower_rad, upper_rad)
+        return JointLimits(velocity, acceleration, lower_rad, upper_rad, slides)
 
 
 class JointReference:

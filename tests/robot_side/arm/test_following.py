@@ -39,9 +39,11 @@ class Lagging:
     """What the joints do of what they are told, at a time"""
     touches: bool = False
     start_rad: float = 0.0
+    slides: bool = False
 
     def drive(self, commands: FloatArray) -> "Driven":
-        following = Following(LIMITS, NAMES, max(2e-4, self.resolution_rad / math.sqrt(12.0)))
+        sigma_rad = max(2e-4, self.resolution_rad / math.sqrt(12.0))
+        following = Following(replace(LIMITS, slides=self.slides), NAMES, sigma_rad)
         driven, random = Driven(following), np.random.default_rng(1)
         under_way, states = deque([NOTHING] * round(self.delay_s / TICK_S)), deque[tuple[float, ArmState]]()
         position, velocity = np.full(JOINTS, self.start_rad), NOTHING
@@ -157,6 +159,22 @@ def test_a_joint_that_does_not_follow_is_noticed_within_half_a_second(
         errors_rad_s = driven.following.errors_rad_s
         assert errors_rad_s is not None
         assert np.abs(errors_rad_s).max() > 0.15
+
+
+@pytest.mark.parametrize("slides", [False, True])
+@pytest.mark.parametrize("rad_s", [0.005, 0.02, 0.04, 0.1])
+def test_a_joint_that_is_driven_gently_or_sinks_is_noticed_by_the_way_and_stops(rad_s: float, slides: bool) -> None:
+    speed = 0.2 * rad_s if slides else rad_s
+    arm, seconds = Lagging(slides=slides), 2.0 + 0.03 / rad_s
+    driven = replace(arm, does=lambda told, _: told * [1, 0, 1]).drive(steady(speed, speed, 0.0, seconds=seconds))
+    (said_s, says), (stops_s, _) = driven.said[0], driven.stops[0]
+    assert says == f"{KNEE} does not move"
+    assert said_s < DRIVEN_S + max(0.5, 0.25 + 0.03 / rad_s)
+    assert stops_s < said_s + 0.6
+    if rad_s >= 0.04:
+        sinks = replace(arm, does=lambda told, _: told - [0.0, speed, 0.0]).drive(steady(speed, 0.0, 0.0, seconds=4.0))
+        assert {text for _, text in sinks.said + sinks.stops} == {f"{KNEE} moves otherwise than commanded"}
+        assert sinks.stops[0][0] < 0.7 + 0.03 / rad_s
 
 
 def stands(told: FloatArray, at_s: float) -> FloatArray:

@@ -23,13 +23,13 @@ _ROOM: Final = 0.5
 def following_findings(scene: Scene, arm: MujocoArm, limits: MotionLimits) -> list[str]:
     """Return a line if joints do not follow a command; nothing may have moved before. It takes some 500 steps."""
     robot, model = scene.robot, scene.model
-    turns = model.jnt_type[robot.arm_joints] == JointKind.HINGE
+    slides = model.jnt_type[robot.arm_joints] == JointKind.SLIDE
     lower_rad, upper_rad = arm.ends_rad
     at_rad = scene.data.qpos[robot.arm_positions]
     up, down = upper_rad - at_rad, at_rad - lower_rad
-    fastest = np.minimum(np.where(turns, _TRIED_RAD_S, _TRIED_M_S), _ROOM * np.maximum(up, down) / _TRIED_S)
+    fastest = np.minimum(np.where(slides, _TRIED_M_S, _TRIED_RAD_S), _ROOM * np.maximum(up, down) / _TRIED_S)
     told = np.where(up >= down, fastest, -fastest)
-    following = Following(limits.of_joints(arm.joint_count, lower_rad, upper_rad), joint_names(scene)[0])
+    following = Following(limits.of_joints(arm.joint_count, lower_rad, upper_rad, slides), joint_names(scene)[0])
     nothing = np.empty(0)
     for step, positions_rad in enumerate(arm.rehearse(told, _TRIED_S)):
         state = ArmState(step * float(model.opt.timestep), positions_rad, told, nothing, 0.0, gripper_holding=False)
