@@ -7,8 +7,8 @@ arm ─▶ kinematics ─▶ law: contact ahead ─▶ stiffness fields ─▶ p
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import Any, Final
 
 import msgspec
 import numpy as np
@@ -39,6 +39,10 @@ from robot_side.reporting.reports import Reports
 from robot_side.surroundings.distances import object_distances
 from robot_side.surroundings.perceived import ObjectSource
 from robot_side.surroundings.surroundings import Sight, Surroundings
+
+_TRIED_RAD: Final = 0.1
+_LEVER_M: Final = 0.1
+"""Turn of a joint, and lever from which what it turns may meet something: what is nearer stands beside it anyway"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -198,14 +202,25 @@ class RobotSide:
         # In every tick, so that a link that falls silent ages, too (eq. 8).
         return loop_age.update(age_s + late_s, now_s)
 
-    def _touches(self) -> bool:
-        """Return whether the gripper, or what it holds, may touch something, as far as errors allow."""
-        if self.newest is None:
+    def _touches(self, joint: int) -> bool:
+        """Return whether what `joint` (from 0) moves may touch something, as far as errors allow.
+
+        These are the gripper, what it holds, and the coarse spheres around the links that are not next to the joint.
+        """
+        if self.newest is None or self._measured is None:
             return False
-        situation = self.newest[1]
+        situation, state, link_spheres = self.newest[1], self._measured, self.parts.kinematics.link_spheres
         pose, scene = situation.pose, self.parts.surroundings.see(situation.objects)
-        reach_m = CLEAR_M + self.parts.misplaced_m
-        near = np.isfinite(object_distances(pose.sphere_centers_m, pose.sphere_radii_m, scene, reach_m))
+        elsewhere_rad = state.joint_positions_rad.copy()
+        elsewhere_rad[joint] += _TRIED_RAD
+        centers_m, radii_m = link_spheres(state)
+        moved_m = link_spheres(replace(state, joint_positions_rad=elsewhere_rad))[0] - centers_m
+        swings = np.linalg.norm(moved_m, axis=1) > _TRIED_RAD * _LEVER_M
+        spheres = (
+            np.concatenate([pose.sphere_centers_m, centers_m[swings]]),
+            np.concatenate([pose.sphere_radii_m, radii_m[swings]]),
+        )
+        near = np.isfinite(object_distances(*spheres, scene, CLEAR_M + self.parts.misplaced_m))
         return any(index != self.grip.index for index in np.flatnonzero(near).tolist())
 
     def observe(self, now_s: float) -> list[Outgoing]:

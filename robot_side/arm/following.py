@@ -2,7 +2,7 @@
 
 follows ─▶ noticed ─▶ stopped
               │          a joint has been still, or gone too far, for half a second; or astray for a quarter
-              └ held: something in its way explains it
+              └ held: its load rises, and something perceived is near what it moves
 """
 
 import math
@@ -23,9 +23,13 @@ NOTICED_RAD: Final = 0.02
 It counts at `LEVER_M` where a joint slides; six standard deviations of readings are added"""
 STOPS_S: Final = {Fault.STILL: 0.5, Fault.FAR: 0.5, Fault.ASTRAY: 0.25}
 """Times, in s, after which faults stop the arm, once they were noticed"""
+_PRESSING_S: Final = 2.0
+"""Time, in s, after which a fault stops the arm though its drive presses on: on a brake, or on what is not perceived"""
 _LIMITS_S: Final[FloatArray] = np.array([STOPS_S.get(fault, math.inf) for fault in Fault])
 _ASKED_AGAIN_S: Final = 0.1
 _NO_LOADS: Final[FloatArray] = np.empty(0)
+_TURN_RAD: Final = 6.0
+"""Range from which a joint may turn all round, so that its driver may wrap its readings; the ends have margins"""
 _SAYS: Final = {
     Fault.ASTRAY: ("moves", "move", " otherwise than commanded"),
     Fault.FAR: ("moves", "move", " too far"),
@@ -50,11 +54,14 @@ class Following:
         self._names = [f"joint {j + 1}" + (f" ({names[j][:40]})" if j < len(names) else "") for j in range(count)]
         self._tracks, self._clock = np.zeros(count, TRACK), np.zeros(1, CLOCK)
         self._tracks["limit"] = NOTICED_RAD * np.where(limits.slides, LEVER_M, 1.0) + 6.0 * sigma_rad
+        lower_rad, upper_rad = limits.ends_rad
+        turns = ~np.array(limits.slides) & (upper_rad - lower_rad >= _TURN_RAD)
+        self._tracks["turn"] = np.where(turns, 2.0 * math.pi, 0.0)
         self._known = np.zeros(count, dtype=np.int64)
         self._told, self._worst = np.zeros(count, dtype=bool), Fault.NONE
         self._noticed: Counter[str] = Counter()
         self._held = 0
-        self._touches, self._asked_s = False, -math.inf
+        self._touches, self._asked_s = np.zeros(count, dtype=bool), np.full(count, -math.inf)
         self.restart()
 
     def restart(self) -> None:
@@ -67,12 +74,12 @@ class Following:
         self._known[:], self._told[:] = 0, False
 
     def update(
-        self, commanded_rad_s: FloatArray | None, state: ArmState, late_s: float, touches: Callable[[], bool]
+        self, commanded_rad_s: FloatArray | None, state: ArmState, late_s: float, touches: Callable[[int], bool]
     ) -> None:
         """Take the newest state, and the velocities (n,) commanded in the tick before; None: the arm is to stand still.
 
-        late_s: the state's lateness. touches: says whether the gripper may touch something. Meanwhile an arm that does
-        not measure its loads is not stopped.
+        late_s: the state's lateness. touches: says whether what a joint (from 0) moves may touch something. Meanwhile
+        the joint does not stop an arm that does not measure its loads, and a load that rises explains its fault.
         """
         loads = _NO_LOADS if state.joint_loads_nm is None else state.joint_loads_nm
         time_s = state.time_s if state.simulated_s is None else state.simulated_s
@@ -95,15 +102,17 @@ class Following:
         """Return how often joints were noticed, by name, and how often something held or pushed one."""
         return {"noticed": dict(sorted(self._noticed.items())), "held": self._held}
 
-    def _judge(self, blind: bool, touches: Callable[[], bool], time_s: float) -> None:
+    def _judge(self, blind: bool, touches: Callable[[int], bool], time_s: float) -> None:
         """Judge joints that are at fault. blind: whether loads are unknown."""
         tracks = self._tracks
-        if blind:
-            if not 0.0 <= time_s - self._asked_s < _ASKED_AGAIN_S:
-                self._touches, self._asked_s = touches(), time_s
-            if self._touches:
-                tracks["lasts"] = 0.0
-        faults, held = tracks["fault"], tracks["held"] > 0.0
+        faults, presses = tracks["fault"], tracks["held"] > 0.0
+        doubted = (faults > 0) & (presses | blind)
+        for joint in np.flatnonzero(doubted):
+            if not 0.0 <= time_s - self._asked_s[joint] < _ASKED_AGAIN_S:
+                self._touches[joint], self._asked_s[joint] = touches(int(joint)), time_s
+        near = doubted & self._touches
+        tracks["lasts"][near] = 0.0
+        held = presses & near
         known = np.where(faults == Fault.NONE, 0, np.where(held, 1, 2))
         for joint in np.flatnonzero(known > self._known):
             if known[joint] == 2:
@@ -117,8 +126,8 @@ class Following:
         self._told = (self._told & (worst == self._worst)) | (own == worst if worst else faults > 0)
         self._worst = worst
         self.text = self._words(self._told, worst)
-        self.errors_rad_s = tracks["error"].copy() if worst else None
-        stops = tracks["lasts"] > _LIMITS_S[own]
+        self.errors_rad_s = np.where(held, 0.0, tracks["error"]) if worst else None
+        stops = tracks["lasts"] > np.maximum(_LIMITS_S[own], np.where(presses, _PRESSING_S, 0.0))
         if not stops.any():
             self.stop = None
         elif self.stop is None:

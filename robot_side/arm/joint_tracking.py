@@ -41,8 +41,11 @@ _JUDGED: Final = 0.25
 _NEAR_END: Final = 5.0
 """Distance from the end of its range, beyond what it needs to stop, within which a joint may stand"""
 _LEAST_LOAD_NM: Final = 0.1
+_NOISES: Final = 4.0
+_PRESSES_S: Final = 0.03
 _EXCUSED_S: Final = 0.3
-"""Rise of a joint's load that shows that something holds or pushes it, and time for which this explains a fault"""
+"""Rise of a joint's load, beyond so many times its noise and for so long, that shows that something holds or pushes the
+joint; time for which this explains a fault"""
 
 
 class Fault(IntEnum):
@@ -64,7 +67,8 @@ TRACK: Final = np.dtype(
             (name, np.float64)
             for name in (
                 *("position", "least", "greatest", "next_least", "next_greatest", "toward", "short", "up", "down"),
-                *("speed", "told", "made", "lasts", "held", "load", "usual_load", "error", "limit"),
+                *("speed", "told", "made", "lasts", "held", "error", "limit", "turn"),
+                *("load", "usual_load", "noise", "known", "pressed"),
             )
         ),
         ("least_told", np.float64, (_SLOTS,)),
@@ -73,9 +77,11 @@ TRACK: Final = np.dtype(
 )
 """Record of a joint, in rad and s. held: time for which its load still explains its fault; 0 if it does not. least,
 greatest: expected velocity; next_least, next_greatest: what these approach. toward: last direction of that velocity.
-limit: way that is noticed. short: way that the joint stays behind. up, down: ways beyond. told, made: recent commanded
-and measured ways along `toward`. lasts: time for which a fault other than SLOW lasts, unless held. error: measured
-velocity beyond the expected ones, while at fault and not held. least_told, greatest_told: bounds of the commands in each time slot."""
+limit: way that is noticed. turn: after which readings may repeat; 0 if they do not. short: way that the joint stays
+behind. up, down: ways beyond. told, made: recent commanded and measured ways along `toward`. lasts: time for which a
+fault other than SLOW lasts. error: measured velocity beyond the expected ones, while at fault. noise: mean deviation of
+a load's readings. known: share of the usual load that is known. pressed: time for which the drive has pressed against a
+deviation. least_told, greatest_told: bounds of the commands in each time slot."""
 CLOCK: Final = np.dtype([("slot", np.int64), ("faults", np.int64), ("time", np.float64)])
 """Record of the tracking: number of the newest time slot, number of joints at fault, time of the newest state"""
 
@@ -93,7 +99,8 @@ def _begin(tracks: Any, command: FloatArray, positions: FloatArray, loads: Float
         one.position, one.toward, one.speed, one.error = positions[j], 0.0, 0.0, 0.0
         one.least, one.greatest = min(command[j], 0.0), max(command[j], 0.0)
         one.short, one.up, one.down, one.told, one.made, one.lasts = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-        one.load = one.usual_load = loads[j] if loads.size > 0 else 0.0
+        one.load = loads[j] if loads.size > 0 else 0.0
+        one.usual_load, one.noise, one.known, one.pressed = one.load, 0.0, 0.0, 0.0
         one.fault, one.held = 0, 0.0
         for slot in range(_SLOTS):
             one.least_told[slot], one.greatest_told[slot] = one.least, one.greatest
@@ -164,17 +171,22 @@ def _judge(one: Any, load: float, since: float) -> None:
         still = _NO_LONGER_STILL if before == Fault.STILL else _STILL
         fault = Fault.STILL if one.made < still * one.told else Fault.SLOW
     one.fault = fault
-    one.load += _approached(load - one.load, since, _LOAD_S)
     if max(one.up, one.down, one.short) < 0.25 * limit:
-        one.usual_load += _approached(load - one.usual_load, since, _USUAL_LOAD_S)
-    # A drive that is held up or pushed presses against its deviation.
-    against = one.toward if fault in (Fault.STILL, Fault.SLOW) else -side
+        one.known += _approached(1.0 - one.known, since, _USUAL_LOAD_S)
+        share = _approached(1.0, since, _USUAL_LOAD_S) / one.known
+        one.noise += share * (abs(load - one.load) - one.noise)
+        one.usual_load += share * (load - one.usual_load)
+    one.load += _approached(load - one.load, since, _LOAD_S)
+    # A drive that is held up or pushed presses against its deviation. A load that only ceases presses on nothing.
+    against = one.toward if one.short > max(one.up, one.down) else -side
+    least = max(against * one.usual_load, 0.0) + _LEAST_LOAD_NM + _NOISES * one.noise
+    one.pressed = one.pressed + since if against * one.load > least else 0.0
     one.held = max(one.held - since, 0.0) if fault > 0 else 0.0
-    if fault > 0 and against * (one.load - one.usual_load) > _LEAST_LOAD_NM:
+    if fault > 0 and one.pressed >= _PRESSES_S:
         one.held = _EXCUSED_S
     stopping = fault in (Fault.FAR, Fault.ASTRAY, Fault.STILL)
-    one.lasts = one.lasts + since if stopping and fault == before and one.held == 0.0 else 0.0
-    one.error = one.speed - min(max(one.speed, one.least), one.greatest) if fault > 0 and one.held == 0.0 else 0.0
+    one.lasts = one.lasts + since if stopping and fault == before else 0.0
+    one.error = one.speed - min(max(one.speed, one.least), one.greatest) if fault > 0 else 0.0
 
 
 @compiled(
@@ -220,6 +232,8 @@ def track(
     _expect(tracks, clock, lower, upper, fastest, since, late)
     for j in range(tracks.size):
         one, moved = tracks[j], positions[j] - tracks[j].position
+        if one.turn > 0.0:
+            moved -= one.turn * np.rint(moved / one.turn)
         one.position = positions[j]
         _add_up(one, moved, since)
         _judge(one, loads[j] if loads.size > 0 else 0.0, since)

@@ -54,6 +54,7 @@ def servo_off(parts: SceneParts, _: Unlike) -> None:
 
 def brake(parts: SceneParts, _: Unlike) -> None:
     parts.scene.model.dof_damping[parts.scene.robot.arm_velocities[2]] = 1e5
+    parts.scene.model.dof_frictionloss[parts.scene.robot.arm_velocities[2]] = 1e4
 
 
 def drop_all(_: SceneParts, arm: Unlike) -> None:

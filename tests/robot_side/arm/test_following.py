@@ -40,6 +40,7 @@ class Lagging:
     touches: bool = False
     start_rad: float = 0.0
     slides: bool = False
+    wraps: bool = False
 
     def drive(self, commands: FloatArray) -> "Driven":
         sigma_rad = max(2e-4, self.resolution_rad / math.sqrt(12.0))
@@ -53,7 +54,7 @@ class Lagging:
             while states and states[0][0] <= now_s:
                 newest = states.popleft()[1]
             if newest is not None:
-                following.update(before, newest, now_s - newest.time_s, lambda: self.touches)
+                following.update(before, newest, now_s - newest.time_s, lambda _: self.touches)
                 driven.note(now_s)
             before = command
             under_way.append(command)
@@ -67,6 +68,8 @@ class Lagging:
             if now_s + TICK_S >= due_s:
                 due_s += self.period_s
                 read = position + random.normal(0.0, 2e-4, JOINTS)
+                if self.wraps:
+                    read = np.remainder(read, 2.0 * math.pi)
                 if self.resolution_rad:
                     read = np.rint(read / self.resolution_rad) * self.resolution_rad
                 at_s = now_s + TICK_S
@@ -110,6 +113,7 @@ ARMS = {
     "simulated": Lagging(),
     "of few readings": Lagging(resolution_rad=0.02),
     "slow physics": Lagging(share=0.1),
+    "of wrapped readings": Lagging(wraps=True),
     "like a Franka": Lagging(delay_s=0.004, lag_s=0.02, period_s=0.012, late_s=0.004),
     "like a UR": Lagging(delay_s=0.02, lag_s=0.05, period_s=0.008, late_s=0.004, loads_nm=None),
     "like an SO-101": Lagging(0.04, 0.1, 20.0, 0.032, 0.02, 1.5e-3, loads_nm=None),
@@ -185,26 +189,45 @@ def pushed(told: FloatArray, at_s: float) -> FloatArray:
     return told - [0.0, 0.3 * (at_s > BEGINS_S), 0.0]
 
 
+@pytest.mark.parametrize("period_s", [TICK_S, 1.0 / 30.0])
 @pytest.mark.parametrize(
-    ("does", "knee_rad_s", "load_nm", "held"),
-    # A drive that is held up presses on, and a pushed one resists. One without current does neither.
-    [(stands, 0.5, 5.0, True), (stands, 0.5, -5.0, False), (pushed, 0.0, 5.0, True), (pushed, 0.0, -5.0, False)],
+    ("does", "knee_rad_s", "loads_nm", "noise_nm", "held"),
+    # A drive that is held up presses on, and a pushed one resists. One without current does neither, and bears nothing.
+    [
+        *((stands, 0.5, loads_nm, 0.0, loads_nm[1] > 0.0) for loads_nm in ((0, 5), (-2, 2), (0, -5), (2, 0), (-2, 0))),
+        *((stands, -0.5, loads_nm, 0.0, loads_nm[1] < 0.0) for loads_nm in ((0.3, 0), (2, -1))),
+        *((stands, 0.5, (1, 1), noise_nm, False) for noise_nm in (0.2, 0.3, 1.0)),
+        (stands, 0.5, (0, 5), 0.3, True),
+        *((pushed, 0.0, loads_nm, 0.0, loads_nm[1] > 0.0) for loads_nm in ((0, 5), (0, -5), (-2, 0))),
+    ],
 )
-def test_what_something_holds_or_pushes_is_said_but_stops_nothing(
-    does: Callable[[FloatArray, float], FloatArray], knee_rad_s: float, load_nm: float, held: bool
+def test_what_something_near_holds_or_pushes_is_said_but_stops_nothing(
+    does: Callable[[FloatArray, float], FloatArray],
+    knee_rad_s: float,
+    loads_nm: tuple[float, float],
+    noise_nm: float,
+    held: bool,
+    period_s: float,
 ) -> None:
-    loads_nm = np.zeros(JOINTS)
+    for near in (True, False):
+        measured_nm, random = np.zeros(JOINTS), np.random.default_rng(3)
 
-    def loaded(told: FloatArray, at_s: float) -> FloatArray:
-        loads_nm[1] = load_nm * (at_s > BEGINS_S)
-        return does(told, at_s)
+        def loaded(told: FloatArray, at_s: float) -> FloatArray:
+            measured_nm[1] = random.normal(loads_nm[int(at_s > BEGINS_S)], noise_nm)  # noqa: B023
+            return does(told, at_s)
 
-    driven = Lagging(does=loaded, loads_nm=loads_nm).drive(steady(0.3, knee_rad_s, 0.0))
-    assert ([text for _, text in driven.said] == [f"something holds or pushes {KNEE}"]) is held
-    assert (driven.stops == []) is held
-    assert driven.following.summary() == {"noticed": {} if held else {KNEE: 1}, "held": int(held)}
-    assert (driven.following.errors_rad_s is None) is held
-    # Without loads only the stop is left out where the gripper may touch something.
+        arm = Lagging(does=loaded, loads_nm=measured_nm, touches=near, period_s=period_s)
+        driven = arm.drive(steady(0.3, knee_rad_s, 0.0, seconds=4.0))
+        if near and held:
+            assert driven.said[-1][1] == f"something holds or pushes {KNEE}"
+            assert driven.stops == []
+            assert driven.following.errors_rad_s is None or not driven.following.errors_rad_s.any()
+        else:
+            # What presses against nothing that is perceived may be a brake.
+            assert all(KNEE in text and "holds" not in text for _, text in driven.said)
+            assert driven.stops[0][0] < BEGINS_S + (2.7 if held else 1.2)
+            assert driven.following.summary() == {"noticed": {KNEE: 1}, "held": 0}
+    # Without loads only the stop is left out where the joint may touch something.
     driven = Lagging(does=does, loads_nm=None, touches=held).drive(steady(0.3, knee_rad_s, 0.0))
     assert (driven.stops == []) is held
     assert driven.following.summary() == {"noticed": {KNEE: 1}, "held": 0}
@@ -225,7 +248,7 @@ def test_after_a_gap_and_after_a_restart_it_begins_anew() -> None:
     def said(position_rad: float, *times_s: float) -> str | None:
         for time_s in times_s:
             state = ArmState(time_s, np.full(JOINTS, position_rad), NOTHING, np.empty(0), 0.0, False, NOTHING)
-            following.update(None, state, 0.0, lambda: False)
+            following.update(None, state, 0.0, lambda _: False)
         return following.text
 
     assert said(0.0, 0.0, 0.004) is None

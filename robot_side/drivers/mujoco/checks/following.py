@@ -33,7 +33,7 @@ def following_findings(scene: Scene, arm: MujocoArm, limits: MotionLimits) -> li
     nothing = np.empty(0)
     for step, positions_rad in enumerate(arm.rehearse(told, _TRIED_S)):
         state = ArmState(step * float(model.opt.timestep), positions_rad, told, nothing, 0.0, gripper_holding=False)
-        following.update(told, state, 0.0, lambda: False)
+        following.update(told, state, 0.0, lambda _: False)
     if following.text is None:
         return []
     return [f"tried in empty space, at up to {_TRIED_RAD_S:.0f} rad/s: {following.text}"]
