@@ -23,9 +23,9 @@ from robot_side.drivers.mujoco.checks.reach import reach_findings, target_findin
 from robot_side.drivers.mujoco.checks.site_axis import site_findings
 from robot_side.drivers.mujoco.checks.start_collision import start_collision
 from robot_side.drivers.mujoco.encoders import Encoder
+from robot_side.drivers.mujoco.gripper_measurement import GripperTravel
 from robot_side.drivers.mujoco.ground_truth import GroundTruth
 from robot_side.drivers.mujoco.hand.gripper_cover import GripperCover
-from robot_side.drivers.mujoco.hand.gripper_measurement import GripperTravel
 from robot_side.drivers.mujoco.joint_reference import MotionLimits
 from robot_side.drivers.mujoco.kinematics import MujocoKinematics
 from robot_side.drivers.mujoco.model_enums import JointKind

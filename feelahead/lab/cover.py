@@ -12,8 +12,8 @@ from common.arrays import FloatArray
 from feelahead.lab.figures import figure
 from feelahead.lab.posed_gripper import PosedGripper
 from feelahead.lab.table import Row, Table
+from robot_side.drivers.mujoco.gripper_measurement import open_gap
 from robot_side.drivers.mujoco.hand.gripper_cover import cover_gripper, link_solids, placed_corners
-from robot_side.drivers.mujoco.hand.gripper_measurement import open_gap
 from robot_side.drivers.mujoco.scene import load_scene
 from robot_side.gripper.solids import Solid
 from robot_side.overlap.meshes.mesh import Mesh

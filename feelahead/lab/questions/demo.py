@@ -24,7 +24,7 @@ from robot_side.drivers.mujoco.checks.joints import joint_findings
 from robot_side.drivers.mujoco.checks.reach import reach_findings, target_findings
 from robot_side.drivers.mujoco.checks.site_axis import site_findings
 from robot_side.drivers.mujoco.checks.start_collision import start_collision
-from robot_side.drivers.mujoco.hand.gripper_measurement import measure_gripper
+from robot_side.drivers.mujoco.gripper_measurement import measure_gripper
 from robot_side.drivers.mujoco.robot_model import SiteAxis
 from robot_side.drivers.mujoco.scene import load_scene
 from robot_side.main import TICK_PERIOD_S

@@ -13,8 +13,8 @@ from robot_side.arm.port import ArmState
 from robot_side.drivers.mujoco.drives.actuators import moves_any
 from robot_side.drivers.mujoco.drives.joint_drives import hold_idle
 from robot_side.drivers.mujoco.encoders import Encoder
+from robot_side.drivers.mujoco.gripper_measurement import GripperTravel, measure_gripper
 from robot_side.drivers.mujoco.hand.gripper_drive import GRIPPER, GRIPPER_INPUT, GripperDrive
-from robot_side.drivers.mujoco.hand.gripper_measurement import GripperTravel, measure_gripper
 from robot_side.drivers.mujoco.hand.gripper_sweep import STROKE_TIME_S
 from robot_side.drivers.mujoco.joint_reference import JointReference, MotionLimits
 from robot_side.drivers.mujoco.plant import LIMITS, PLANT, Plant, drive, inertia_table, sense

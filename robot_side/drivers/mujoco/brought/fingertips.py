@@ -8,8 +8,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from common.arrays import FloatArray
+from robot_side.drivers.mujoco.gripper_measurement import GripperTravel, jaw_places_m, opened
 from robot_side.drivers.mujoco.hand.gripper_gap import AWAY_M, INSIDE_M, convex_geoms
-from robot_side.drivers.mujoco.hand.gripper_measurement import GripperTravel, jaw_places_m, opened
 from robot_side.drivers.mujoco.robot_model import RobotModel, put_site
 
 _ASIDE_M: Final = 0.005

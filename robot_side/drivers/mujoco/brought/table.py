@@ -22,7 +22,7 @@ from robot_side.drivers.mujoco.brought.fingertips import (
 )
 from robot_side.drivers.mujoco.brought.reach import FROM_ABOVE, NEAR_M, go, grasp_places
 from robot_side.drivers.mujoco.built_in_scenes import make_room
-from robot_side.drivers.mujoco.hand.gripper_measurement import GripperTravel, measure_gripper, opened
+from robot_side.drivers.mujoco.gripper_measurement import GripperTravel, measure_gripper, opened
 from robot_side.drivers.mujoco.mesh_arrays import geom_points
 from robot_side.drivers.mujoco.model_enums import GeomKind
 from robot_side.drivers.mujoco.robot_model import RobotModel, Simulated

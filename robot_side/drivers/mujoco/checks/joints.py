@@ -9,7 +9,7 @@ import numpy as np
 
 from common.roles import Role
 from robot_side.drivers.mujoco.drives.actuators import moves_any
-from robot_side.drivers.mujoco.hand.gripper_measurement import GripperTravel
+from robot_side.drivers.mujoco.gripper_measurement import GripperTravel
 from robot_side.drivers.mujoco.mesh_arrays import geom_points
 from robot_side.drivers.mujoco.model_enums import JointKind
 from robot_side.drivers.mujoco.scene import Scene

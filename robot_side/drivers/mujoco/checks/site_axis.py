@@ -5,7 +5,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from common.arrays import FloatArray
-from robot_side.drivers.mujoco.hand.gripper_measurement import GripperTravel
+from robot_side.drivers.mujoco.gripper_measurement import GripperTravel
 from robot_side.drivers.mujoco.robot_model import AXES, SiteAxis
 from robot_side.drivers.mujoco.scene import Scene
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from common.arrays import FloatArray, IntArray
 from robot_side.compiled.kernel import building_block, inlined
-from robot_side.drivers.mujoco.hand.gripper_measurement import (
+from robot_side.drivers.mujoco.gripper_measurement import (
     LEAD,
     NOTHING_M,
     STANDING_SPEED_1_S,

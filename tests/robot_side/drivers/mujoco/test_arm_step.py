@@ -10,7 +10,7 @@ import pytest
 from common.arrays import FloatArray
 from robot_side.drivers.mujoco.arm import MujocoArm
 from robot_side.drivers.mujoco.encoders import Encoder
-from robot_side.drivers.mujoco.hand.gripper_measurement import GripperTravel, measure_gripper
+from robot_side.drivers.mujoco.gripper_measurement import GripperTravel, measure_gripper
 from robot_side.drivers.mujoco.joint_reference import MotionLimits
 from robot_side.drivers.mujoco.scene import Scene, load_scene
 from tests.helpers.arm_models import MIRRORED_GRIPPER, MOTORS, POSITION_SERVOS, SEVERAL, VELOCITY_SERVOS, planar_arm

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from robot_side.drivers.mujoco.checks.site_axis import site_findings
-from robot_side.drivers.mujoco.hand.gripper_measurement import measure_gripper
+from robot_side.drivers.mujoco.gripper_measurement import measure_gripper
 from robot_side.drivers.mujoco.kinematics import MujocoKinematics
 from robot_side.drivers.mujoco.robot_model import SiteAxis
 from robot_side.drivers.mujoco.scene import load_scene

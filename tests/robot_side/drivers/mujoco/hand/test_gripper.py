@@ -10,16 +10,16 @@ import pytest
 from common.arrays import FloatArray
 from common.errors import ConfigurationError
 from robot_side.compiled.kernel import FLOAT64, compiled, output_array, record_array
-from robot_side.drivers.mujoco.hand import gripper_cover
-from robot_side.drivers.mujoco.hand.gripper_cover import cover_gripper
-from robot_side.drivers.mujoco.hand.gripper_drive import GRIPPER, GripperDrive, advance_gripper
-from robot_side.drivers.mujoco.hand.gripper_measurement import (
+from robot_side.drivers.mujoco.gripper_measurement import (
     candidate_ends,
     measure_gripper,
     open_gap,
     resistance,
     rising,
 )
+from robot_side.drivers.mujoco.hand import gripper_cover
+from robot_side.drivers.mujoco.hand.gripper_cover import cover_gripper
+from robot_side.drivers.mujoco.hand.gripper_drive import GRIPPER, GripperDrive, advance_gripper
 from robot_side.drivers.mujoco.hand.gripper_sweep import ClosingRun
 from robot_side.drivers.mujoco.scene import load_scene
 from robot_side.gripper.surface_cover import cover_surface

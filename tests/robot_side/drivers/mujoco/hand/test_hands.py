@@ -10,7 +10,7 @@ from common.errors import ConfigurationError
 from robot_side.drivers.mujoco.arm import MujocoArm
 from robot_side.drivers.mujoco.checks.joints import joint_findings
 from robot_side.drivers.mujoco.encoders import Encoder
-from robot_side.drivers.mujoco.hand.gripper_measurement import GripperTravel, measure_gripper
+from robot_side.drivers.mujoco.gripper_measurement import GripperTravel, measure_gripper
 from robot_side.drivers.mujoco.scene import load_scene
 from tests.robot_side.drivers.mujoco.hand.hands import APART, SLIDING, Hand, servo
 
