@@ -12,6 +12,6 @@ TransmissionKind = IntEnum("TransmissionKind", "JOINT JOINT_IN_PARENT SLIDER_CRA
 WrappedKind = IntEnum("WrappedKind", "NONE JOINT", start=0)
 """Kinds of elements of which a fixed tendon consists"""
 GainKind = IntEnum("GainKind", "FIXED AFFINE MUSCLE DCMOTOR SO3 PID", start=0)
-DynamicsKind = IntEnum("DynamicsKind", "NONE", start=0)
+DynamicsKind = IntEnum("DynamicsKind", "NONE INTEGRATOR FILTER FILTEREXACT", start=0)
 """Kinds of internal states of actuators"""
 BiasKind = IntEnum("BiasKind", "NONE AFFINE", start=0)

@@ -7,11 +7,13 @@ import mujoco  # type: ignore[import-untyped]
 import numpy as np
 
 from common.errors import ConfigurationError
-from robot_side.drivers.mujoco.model_enums import BiasKind, GainKind, TransmissionKind
+from robot_side.drivers.mujoco.model_enums import BiasKind, DynamicsKind, GainKind, TransmissionKind
 from robot_side.drivers.mujoco.robot_model import RobotModel
 
 _FULL_FORCE: Final = 0.3
 """Distance from its goal, as a share of the travel, at which such a servo gives its greatest force"""
+_DIRECT: Final = (DynamicsKind.NONE, DynamicsKind.FILTER, DynamicsKind.FILTEREXACT)
+"""Dynamics by which an input acts at once, or with a time constant, which the servo keeps"""
 
 
 def serve_gripper(spec: Any, model: Any, robot: RobotModel) -> bool:
@@ -25,8 +27,8 @@ def serve_gripper(spec: Any, model: Any, robot: RobotModel) -> bool:
         gain, bias = abs(float(model.actuator_gainprm[actuator, 0])), model.actuator_biasprm[actuator]
         if model.actuator_biastype[actuator] == BiasKind.NONE:
             bias = np.zeros_like(bias)
-        integrates = model.actuator_dyntype[actuator] == mujoco.mjtDyn.mjDYN_INTEGRATOR
-        takes_force = model.actuator_dyntype[actuator] == mujoco.mjtDyn.mjDYN_NONE and bias[1] == 0.0
+        integrates = model.actuator_dyntype[actuator] == DynamicsKind.INTEGRATOR
+        takes_force = model.actuator_dyntype[actuator] in _DIRECT and bias[1] == 0.0
         fixed = model.actuator_gaintype[actuator] == GainKind.FIXED and gain > 0.0
         if not fixed or not (takes_force or (integrates and bias[1] < 0.0)):
             continue
@@ -45,7 +47,9 @@ def serve_gripper(spec: Any, model: Any, robot: RobotModel) -> bool:
             stiffness = strongest / (_FULL_FORCE * (longest - shortest))
             damping = max(damping, 2.0 * math.sqrt(stiffness / per_force))
             servo.forcelimited, servo.forcerange = True, [-strongest, strongest]
-        servo.dyntype, servo.actlimited, servo.actrange = mujoco.mjtDyn.mjDYN_NONE, False, [0.0, 0.0]
+        servo.actlimited, servo.actrange = False, [0.0, 0.0]
+        if integrates:
+            servo.dyntype = DynamicsKind.NONE
         servo.gainprm[0], servo.biastype = stiffness, mujoco.mjtBias.mjBIAS_AFFINE
         servo.biasprm[:3] = 0.0, -stiffness, -damping
         # Beyond the travel it presses with its full force at either end.

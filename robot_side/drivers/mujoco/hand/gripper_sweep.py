@@ -30,7 +30,8 @@ _EVEN: Final = 0.75
 """Least step at an end, as a share of the largest step between samples, at which no inputs are dead there"""
 _FINE: Final = 1.0 / 32.0
 """Largest share of the travel by which dead inputs may be left"""
-
+_FINEST: Final = 1e-5
+"""Share of all inputs below which what moves the fingers is a single input"""
 
 _AFTER_S: Final = 0.4
 """Time after the last input of a run, in which slow fingers may arrive"""
@@ -212,9 +213,10 @@ class EmptySpace:
         ends = np.stack([low, high], axis=1)
         moved = _UNMOVED * np.ptp(lengths, axis=0)
         while True:
-            widths = np.ptp(ends, axis=2) / (ends[:, 1, 1] - ends[:, 0, 0])[:, None]
+            least = np.maximum(_FINE * (ends[:, 1, 1] - ends[:, 0, 0]), _FINEST)
+            widths = np.ptp(ends, axis=2) / least[:, None]
             actuator, end = np.unravel_index(widths.argmax(), widths.shape)
-            if widths[actuator, end] <= _FINE:
+            if widths[actuator, end] <= 1.0:
                 return first + ends[:, 0, 0] * (last - first), first + ends[:, 1, 1] * (last - first)
             share = float(ends[actuator, end].mean())
             at = self.lengths(first + share * (last - first))

@@ -52,6 +52,11 @@ def servo(inputs: str = "0 0.03", joint: str = "left", **changed: str) -> str:
     return f'<position name="{joint}" joint="{joint}" ctrlrange="{inputs}" {said}/>'
 
 
+def motor(changed: str = "") -> str:
+    """Return a motor of the left finger of 40 N, either way; changed: its other attributes."""
+    return f'<general joint="left" gainprm="40" ctrlrange="-1 1" {changed}/>'
+
+
 @dataclass(frozen=True)
 class Hand:
     """Hand whose tool points up, and whose jaws close along x; unless given, two jaws slide, with a gap of 60 mm."""

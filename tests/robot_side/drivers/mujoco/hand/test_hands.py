@@ -12,7 +12,7 @@ from robot_side.drivers.mujoco.checks.joints import joint_findings
 from robot_side.drivers.mujoco.encoders import Encoder
 from robot_side.drivers.mujoco.gripper_measurement import GripperTravel, measure_gripper
 from robot_side.drivers.mujoco.scene import load_scene
-from tests.robot_side.drivers.mujoco.hand.hands import APART, SLIDING, Hand, servo
+from tests.robot_side.drivers.mujoco.hand.hands import APART, SLIDING, Hand, motor, servo
 
 L_SHAPED = Hand(
     """
@@ -154,7 +154,8 @@ BOTH = Hand(SLIDING.replace('axis="-1 0 0"', 'range="-0.03 0"'), below="")
         pytest.param(replace(BOTH, actuators=servo(WIDE) + servo("-0.3 0.3", "right")), id="opposed, wide, unequal"),
         pytest.param(Hand(SLIDING.replace('class="slide"', 'class="slide" frictionloss="1.5"')), id="dry friction"),
         pytest.param(Hand(SLIDING.replace('class="slide"', 'class="slide" damping="100"')), id="slow"),
-        pytest.param(Hand(actuators='<motor joint="left" gear="40" ctrlrange="-1 1"/>'), id="motor"),
+        pytest.param(Hand(actuators=motor()), id="motor"),
+        pytest.param(Hand(actuators=motor('dyntype="filter" dynprm="0.05"')), id="motor with a time constant"),
         pytest.param(Hand(actuators='<velocity joint="left" kv="200" ctrlrange="-0.1 0.1"/>'), id="speed"),
         pytest.param(
             Hand(actuators='<intvelocity joint="left" kp="1000" ctrlrange="-0.1 0.1" actrange="0 0.03"/>'),
@@ -199,13 +200,25 @@ def test_a_hand_never_holds_nothing_and_holds_a_post(hand: Hand, tmp_path: Path)
         assert held == (post_m > 0.0)
 
 
-def test_a_hand_that_resists_its_own_drive_is_named(tmp_path: Path) -> None:
-    # The jaw's weight takes 0.1 N m of it.
-    weak = replace(HEAVY, actuators=servo("0 1.6", kp="20", kv="1", forcerange="-0.2 0.2"))
-    scene = load_scene(weak.written(tmp_path), "tool")
-    assert "the hand's own parts resist its drive as much as an object could: nothing can be grasped" in joint_findings(
-        scene, measure_gripper(scene)
-    )
+@pytest.mark.parametrize(
+    ("hand", "why"),
+    [
+        # The jaw's weight takes 0.1 N m of it.
+        pytest.param(
+            replace(HEAVY, actuators=servo("0 1.6", kp="20", kv="1", forcerange="-0.2 0.2")),
+            "the hand's own parts resist its drive as much as an object could",
+            id="weak",
+        ),
+        pytest.param(
+            Hand(actuators=motor('biastype="affine" biasprm="0 -1e-3 -20"')),
+            "the hand's actuators do not bring its fingers together over the whole of their ctrlrange",
+            id="one input moves it all the way",
+        ),
+    ],
+)
+def test_a_hand_that_cannot_grasp_is_named(hand: Hand, why: str, tmp_path: Path) -> None:
+    scene = load_scene(hand.written(tmp_path), "tool")
+    assert f"{why}: nothing can be grasped" in joint_findings(scene, measure_gripper(scene))
 
 
 def test_a_motor_without_a_range_is_named(tmp_path: Path) -> None:
