@@ -62,6 +62,8 @@ class GripperTravel:
     servo's own damping, which needs no force, and in all"""
     force_lead: float
     """Lead beyond the first lag that gives the servo's largest force, as a share of the stroke; infinite without one"""
+    opening_force_lead: float
+    """The same when the gripper opens: a servo may pull only"""
     ahead_m: float
     """How far the fingers reach ahead of the tool's site, open or closed, in m"""
     closing: FloatArray
@@ -113,7 +115,7 @@ def measure_gripper(scene: Simulated) -> GripperTravel | None:
     way = sweep.controls[-1] - sweep.controls[0]
     shares = (np.array([lower, upper]) - sweep.controls[0])[:, way != 0.0] / way[way != 0.0]
     ends = min(float(shares.min(axis=0).max()), 0.0), max(float(shares.max(axis=0).min()), 1.0)
-    lag_s, force_lead = _servo(model, actuators, way)
+    lag_s, force_lead, opening_force_lead = _servo(model, actuators, sweep)
     run = space.close(sweep, min(ends[1], 1.0 + LEAD), lag_s, force_lead)
     whole_lag_s, alone = resistance(run, references, closures, openings_m)
     return GripperTravel(
@@ -130,25 +132,29 @@ def measure_gripper(scene: Simulated) -> GripperTravel | None:
         ends=ends,
         lags_s=(lag_s, max(lag_s, whole_lag_s)),
         force_lead=force_lead,
+        opening_force_lead=opening_force_lead,
         ahead_m=sweep.ahead_m,
         closing=gap.closing,
         jaws=gap.jaws,
     )
 
 
-def _servo(model: Any, actuators: IntArray, way: FloatArray) -> tuple[float, float]:
-    """Return the lag by the servos' own damping, in seconds, and the lead that gives the largest force.
+def _servo(model: Any, actuators: IntArray, sweep: GripperSweep) -> tuple[float, float, float]:
+    """Return the lag by the servos' own damping, in seconds, and both leads, `force_lead` first.
 
-    way (g,): change of the inputs from open to closed. force = gain u - stiffness l - damping dl/dt
+    sweep: from open to closed. force = gain u + offset - stiffness l - damping dl/dt
     """
-    limits = np.where(
-        model.actuator_forcelimited[actuators], np.abs(model.actuator_forcerange[actuators]).min(axis=1), np.inf
-    )
-    stiffness, damping = -model.actuator_biasprm[actuators, 1], -model.actuator_biasprm[actuators, 2]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        leads = limits / np.abs(model.actuator_gainprm[actuators, 0] * way)
-        lags = np.where(stiffness > 0.0, damping / stiffness, 0.0)
-    return float(lags.max()), float(leads.min())
+    gain, limited = model.actuator_gainprm[actuators, 0], model.actuator_forcelimited[actuators].astype(bool)
+    offset, stiffness, damping = (model.actuator_biasprm[actuators, :3] * (1.0, -1.0, -1.0)).T
+    lowest, highest = np.where(limited, model.actuator_forcerange[actuators].T, [[-np.inf], [np.inf]])
+    # Springs load the drive at rest: a servo that only pulls opens by what it gives less.
+    resting = np.clip(gain * sweep.controls + offset - stiffness * sweep.lengths, lowest, highest)
+    each = gain * (sweep.controls[-1] - sweep.controls[0])
+    ends = np.full((2, *resting.shape), np.inf)
+    np.divide([lowest - resting, highest - resting], each, out=ends, where=each != 0.0)
+    opening, closing = np.abs(np.sort(ends, axis=0)).max(axis=1).min(axis=1)
+    lags = np.divide(damping, stiffness, out=np.zeros_like(damping), where=stiffness > 0.0)
+    return float(lags.max()), float(closing), float(opening)
 
 
 def candidate_ends(lower: FloatArray, upper: FloatArray) -> list[tuple[FloatArray, FloatArray]]:

@@ -33,11 +33,12 @@ GRIPPER: Final = np.dtype(
         ("servo_lag_s", np.float64),
         ("lag_s", np.float64),
         ("force_lead", np.float64),
+        ("opening_force_lead", np.float64),
     ]
 )
 """Record of a gripper's drive. reference, closure: commanded and measured position, from 0 (open) to 1 (closed); the
 reference goes beyond, from `least` to `most`, to press. speed: averaged rate of the closure, in 1/s. standing_s: time
-for which something has stopped the fingers. servo_lag_s, lag_s, force_lead: see `GripperTravel`."""
+for which something has stopped the fingers. servo_lag_s, lag_s and the leads: see `GripperTravel`."""
 GRIPPER_INPUT: Final = np.dtype(
     [
         ("place", np.int64),
@@ -67,6 +68,7 @@ class GripperDrive:
             ("servo_lag_s", travel.lags_s[0]),
             ("lag_s", travel.lags_s[1]),
             ("force_lead", travel.force_lead),
+            ("opening_force_lead", travel.opening_force_lead),
         ):
             self.drive[name] = value
         self.samples: FloatArray = np.column_stack(
@@ -152,7 +154,8 @@ def advance_gripper(
         moved = gripper.reference + moving * step_s / gripper.stroke_time_s
         # A moving drive lags its reference without any force on the fingers; a lead beyond the largest force is no use.
         speed = max(math.copysign(1.0, moving) * gripper.speed, 0.0)
-        lead = min(gripper.lag_s * speed + LEAD, gripper.servo_lag_s * speed + gripper.force_lead)
+        strongest = gripper.force_lead if moving > 0.0 else gripper.opening_force_lead
+        lead = min(gripper.lag_s * speed + LEAD, gripper.servo_lag_s * speed + strongest)
         # The reference may lead only in the commanded direction, so that a grip is released at once.
         moved = min(max(moved, free), free + lead) if moving > 0.0 else max(min(moved, free), free - lead)
         gripper.reference = min(max(moved, gripper.least), gripper.most)

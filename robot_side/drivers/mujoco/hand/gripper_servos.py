@@ -24,12 +24,12 @@ def serve_gripper(spec: Any, model: Any, robot: RobotModel) -> bool:
     """
     found = False
     for actuator in robot.gripper_actuators[model.actuator_ctrllimited[robot.gripper_controls].astype(bool)].tolist():
-        gain, bias = abs(float(model.actuator_gainprm[actuator, 0])), model.actuator_biasprm[actuator]
+        gain, bias = float(model.actuator_gainprm[actuator, 0]), model.actuator_biasprm[actuator]
         if model.actuator_biastype[actuator] == BiasKind.NONE:
             bias = np.zeros_like(bias)
         integrates = model.actuator_dyntype[actuator] == DynamicsKind.INTEGRATOR
         takes_force = model.actuator_dyntype[actuator] in _DIRECT and bias[1] == 0.0
-        fixed = model.actuator_gaintype[actuator] == GainKind.FIXED and gain > 0.0
+        fixed = model.actuator_gaintype[actuator] == GainKind.FIXED and gain != 0.0
         if not fixed or not (takes_force or (integrates and bias[1] < 0.0)):
             continue
         shortest, longest, per_force = _travel(model, actuator)
@@ -41,12 +41,12 @@ def serve_gripper(spec: Any, model: Any, robot: RobotModel) -> bool:
             )
         servo, stiffness, damping = spec.actuators[actuator], -float(bias[1]), -float(bias[2])
         if takes_force:
-            strongest = gain * float(np.abs(model.actuator_ctrlrange[model.actuator_ctrladr[actuator]]).max())
+            forces = np.sort(gain * model.actuator_ctrlrange[model.actuator_ctrladr[actuator]])
             if model.actuator_forcelimited[actuator]:
-                strongest = min(strongest, float(np.abs(model.actuator_forcerange[actuator]).min()))
-            stiffness = strongest / (_FULL_FORCE * (longest - shortest))
+                forces = np.clip(forces, *model.actuator_forcerange[actuator])
+            stiffness = float(np.abs(forces).max()) / (_FULL_FORCE * (longest - shortest))
             damping = max(damping, 2.0 * math.sqrt(stiffness / per_force))
-            servo.forcelimited, servo.forcerange = True, [-strongest, strongest]
+            servo.forcelimited, servo.forcerange = True, forces
         servo.actlimited, servo.actrange = False, [0.0, 0.0]
         if integrates:
             servo.dyntype = DynamicsKind.NONE

@@ -69,7 +69,7 @@ class PlainGripper:
         if moving:
             self.closed_last = moving > 0.0
             lags = np.maximum(np.sign(moving) * self.speed, 0.0) * np.array(travel.lags_s)
-            lead = min(lags[1] + 0.3, lags[0] + travel.force_lead)
+            lead = min(lags[1] + 0.3, lags[0] + (travel.force_lead if moving > 0.0 else travel.opening_force_lead))
             nearest, farthest = sorted([free, free + np.sign(moving) * lead])
             moved = np.clip(self.reference + moving * step_s / 0.6, nearest, farthest)
             self.reference = float(np.clip(moved, *travel.ends))

@@ -137,6 +137,7 @@ WIDE, WIDER = "-0.135 0.165", "-1.485 1.515"
 TENDON = """<tendon><fixed name="split">
     <joint joint="left" coef="0.5"/><joint joint="right" coef="0.5"/></fixed></tendon>
   <equality><joint joint1="left" joint2="right"/></equality>"""
+OPENED = SLIDING.replace('class="slide"', 'class="slide" stiffness="200" springref="0.03"')
 BOTH = Hand(SLIDING.replace('axis="-1 0 0"', 'range="-0.03 0"'), below="")
 
 
@@ -154,6 +155,11 @@ BOTH = Hand(SLIDING.replace('axis="-1 0 0"', 'range="-0.03 0"'), below="")
         pytest.param(replace(BOTH, actuators=servo(WIDE) + servo("-0.3 0.3", "right")), id="opposed, wide, unequal"),
         pytest.param(Hand(SLIDING.replace('class="slide"', 'class="slide" frictionloss="1.5"')), id="dry friction"),
         pytest.param(Hand(SLIDING.replace('class="slide"', 'class="slide" damping="100"')), id="slow"),
+        pytest.param(Hand(OPENED, servo(forcerange="-40 0")), id="pulls against a spring"),
+        pytest.param(Hand(OPENED, motor('forcerange="-30 0"')), id="motor that pulls against a spring"),
+        pytest.param(
+            Hand(OPENED.replace("200", "20").replace("0.03", "0"), servo(forcerange="0 40")), id="closed by a spring"
+        ),
         pytest.param(Hand(actuators=motor()), id="motor"),
         pytest.param(Hand(actuators=motor('dyntype="filter" dynprm="0.05"')), id="motor with a time constant"),
         pytest.param(Hand(actuators='<velocity joint="left" kv="200" ctrlrange="-0.1 0.1"/>'), id="speed"),
