@@ -26,6 +26,8 @@ STANDING_SPEED_1_S: Final = 0.05
 """Speed of the closure, in 1/s, below which the fingers rest, if they do so for the standing time"""
 _SAFELY: Final = 1.5
 """Factor for what the gripper itself resists, which differs from time to time"""
+_WEIGHED: Final = 7
+"""Number of inputs at which the fingers' weight is tried"""
 _FLAT: Final = 1e-3
 """Share of the travel up to which inputs move nothing"""
 
@@ -73,7 +75,8 @@ class GripperTravel:
     @property
     def feels(self) -> bool:
         """Whether the drive's lead can tell an object from what the gripper itself resists, somewhere in the travel."""
-        return bool((self.resists < min(LEAD, self.force_lead)).any())
+        apart = self.openings_m > self.openings_m[-1] + NOTHING_M
+        return bool((self.resists < min(LEAD, self.force_lead))[apart].any())
 
 
 def measure_gripper(scene: Simulated) -> GripperTravel | None:
@@ -116,8 +119,15 @@ def measure_gripper(scene: Simulated) -> GripperTravel | None:
     shares = (np.array([lower, upper]) - sweep.controls[0])[:, way != 0.0] / way[way != 0.0]
     ends = min(float(shares.min(axis=0).max()), 0.0), max(float(shares.max(axis=0).min()), 1.0)
     lag_s, force_lead, opening_force_lead = _servo(model, actuators, sweep)
-    run = space.close(sweep, min(ends[1], 1.0 + LEAD), lag_s, force_lead)
+    most = min(ends[1], 1.0 + LEAD)
+    run = space.close(sweep, most, lag_s, force_lead)
     whole_lag_s, alone = resistance(run, references, closures, openings_m)
+    told, weighed = np.linspace(0.0, most, _WEIGHED), [np.zeros(len(closures))]
+    for weight in space.weights(gap.closing):
+        rests = [space.rest(sweep, told, way) for way in (weight, -weight)]
+        weighed.append(np.max([sags(one, told, references, closures, openings_m) for one in rests], axis=0))
+    # However the hand is turned.
+    alone = np.maximum(alone, np.linalg.norm(weighed, axis=0))
     return GripperTravel(
         open_control=sweep.controls[0],
         closed_control=sweep.controls[-1],
@@ -128,7 +138,7 @@ def measure_gripper(scene: Simulated) -> GripperTravel | None:
         references=references,
         closures=closures,
         openings_m=openings_m,
-        resists=min(_RESISTS, 0.5 * force_lead) + _SAFELY * (alone + space.sag(sweep)),
+        resists=min(_RESISTS, 0.5 * force_lead) + _SAFELY * alone,
         ends=ends,
         lags_s=(lag_s, max(lag_s, whole_lag_s)),
         force_lead=force_lead,
@@ -194,9 +204,26 @@ def resistance(
     # For as long as fingers have to rest; they also rest as they begin to move.
     steps = round(STANDING_TIME_S / run.step_s)
     lasts = sliding_window_view(np.where(alone, behind - lag_s * run.speeds, 0.0), steps).min(axis=1)
-    # Each sample stands for the travel on both of its sides.
-    at, from_to = run.closures[steps - 1 :], zip([-np.inf, *closures[:-1]], [*closures[1:], np.inf], strict=True)
-    return lag_s, np.array([lasts[(at >= low) & (at <= high)].max(initial=0.0) for low, high in from_to])
+    return lag_s, _beside(closures, run.closures[steps - 1 :], lasts)
+
+
+def sags(
+    rests: FloatArray, told: FloatArray, references: FloatArray, closures: FloatArray, openings_m: FloatArray
+) -> FloatArray:
+    """Return how far (k,) fingers under their weight, at `rests` (n,) if `told` (n,), lag at the samples."""
+    free = np.interp(rests, closures, openings_m) > openings_m[-1] + NOTHING_M
+    leads, order = np.where(free, told - np.interp(rests, closures, references), 0.0), rests.argsort()
+    # Where the whole weight lets nothing rest, a part of it does.
+    return np.maximum(_beside(closures, rests, leads), np.interp(closures, rests[order], leads[order]))
+
+
+def _beside(closures: FloatArray, at: FloatArray, leads: FloatArray) -> FloatArray:
+    """Return the greatest of `leads` (n,), which are at the closures `at` (n,), beside each sample (k,), or 0.
+
+    Each sample stands for the travel on both of its sides.
+    """
+    from_to = zip([-np.inf, *closures[:-1]], [*closures[1:], np.inf], strict=True)
+    return np.array([leads[(at >= low) & (at <= high)].max(initial=0.0) for low, high in from_to])
 
 
 def open_gap(scene: Simulated, cover: GripperCover) -> tuple[float, float] | None:

@@ -191,18 +191,25 @@ class EmptySpace:
         references, run, speeds = np.array(samples).T
         return ClosingRun(references, run, speeds, timestep_s)
 
-    def sag(self, sweep: GripperSweep) -> float:
-        """Return by how much the fingers' weight moves them at most, halfway, as a share of their travel."""
+    def weights(self, closing: FloatArray) -> list[FloatArray]:
+        """Return accelerations (3,) in the world whose weight may move the fingers either way; none if it is balanced.
+
+        They are along the jaws' motion and the approach. closing (3,): unit vector, in the frame of the tool's site,
+        along which the jaws close.
+        """
         model, geoms = self.model, self.robot.gripper_geoms[self.robot.geom_on_finger]
         if (model.body_gravcomp[model.geom_bodyid[geoms]] >= 1.0).all():
-            return 0.0
-        control, moved = sweep.controls[_SAMPLES // 2], []
-        level = self.lengths(control)
-        for axis in range(3):
-            model.opt.gravity[axis] = self._gravity
-            moved.append((self.lengths(control) - level) @ sweep.per_length)
-            model.opt.gravity[axis] = 0.0
-        return float(np.linalg.norm(moved))
+            return []
+        site = self.data.site_xmat[self.robot.site].reshape(3, 3)
+        return [self._gravity * site @ way for way in (closing, (0.0, 0.0, 1.0))]
+
+    def rest(self, sweep: GripperSweep, references: FloatArray, weight: FloatArray) -> FloatArray:
+        """Return the closures (n,) at rest at `references` (n,), rising, under the acceleration `weight` (3,)."""
+        controls = sweep.controls[0] + references[:, None] * (sweep.controls[-1] - sweep.controls[0])
+        self.model.opt.gravity[:] = weight
+        closures = np.array([(self.lengths(one) - sweep.lengths[0]) @ sweep.per_length for one in controls])
+        self.model.opt.gravity[:] = 0.0
+        return closures
 
     def moving_ends(self, sweep: GripperSweep) -> tuple[FloatArray, FloatArray]:
         """Return those inputs (g,) of a sweep between which each actuator moves its fingers, found by bisection."""

@@ -139,6 +139,12 @@ TENDON = """<tendon><fixed name="split">
   <equality><joint joint1="left" joint2="right"/></equality>"""
 OPENED = SLIDING.replace('class="slide"', 'class="slide" stiffness="200" springref="0.03"')
 BOTH = Hand(SLIDING.replace('axis="-1 0 0"', 'range="-0.03 0"'), below="")
+# One jaw sags open, the other one closed: together they have hardly moved.
+ON_ITS_SIDE = replace(
+    BOTH,
+    jaws=BOTH.jaws.replace('mass="0.05"', 'mass="0.2"'),
+    actuators=servo(kp="600") + servo("-0.03 0", "right", kp="600"),
+)
 
 
 @pytest.mark.parametrize(
@@ -176,6 +182,10 @@ BOTH = Hand(SLIDING.replace('axis="-1 0 0"', 'range="-0.03 0"'), below="")
         ),
         pytest.param(replace(ONE_TURNING, post_at_m=0.01), id="one turns"),
         pytest.param(HEAVY, id="weight"),
+        *(
+            pytest.param(replace(ON_ITS_SIDE, gravity=gravity), id=f"on its side, {gravity}")
+            for gravity in ("9.81 0 0", "-6.9 0 -6.9")
+        ),
         pytest.param(KNUCKLES, id="knuckles"),
         pytest.param(HALF_CLOSED, id="stopped half closed"),
         pytest.param(
