@@ -228,7 +228,7 @@ def test_a_driver_that_loses_commands_is_noticed(
         velocity = 0.4 if tick > 100 else 0.0
         desk.run(TICK_S, velocity)
         state = desk.arm.state(desk.now_s)
-        following.update(np.full(2, velocity), state, lateness_s(state, desk.now_s), lambda: False)
+        following.update(np.full(2, velocity), state, lateness_s(state, desk.now_s), lambda _: False)
         if tick <= 600:
             said.add(following.text)
     assert (says in said) if says else said == {None}
