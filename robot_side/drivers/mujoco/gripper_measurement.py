@@ -28,6 +28,8 @@ _SAFELY: Final = 1.5
 """Factor for what the gripper itself resists, which differs from time to time"""
 _WEIGHED: Final = 7
 """Number of inputs at which the fingers' weight is tried"""
+_CLOSED: Final = 0.05
+"""Last share of the travel, in which fingers without a gap are closed"""
 _FLAT: Final = 1e-3
 """Share of the travel up to which inputs move nothing"""
 
@@ -73,10 +75,17 @@ class GripperTravel:
     jaws: tuple[Jaw, Jaw]
 
     @property
+    def closed_from(self) -> float:
+        """Closure from which on nothing is held: the gap is that of the closed gripper, and the fingers' way is over.
+
+        Fingers that bend around things meet beside the tool before they have closed.
+        """
+        return closed_from(self.closures, self.openings_m)
+
+    @property
     def feels(self) -> bool:
         """Whether the drive's lead can tell an object from what the gripper itself resists, somewhere in the travel."""
-        apart = self.openings_m > self.openings_m[-1] + NOTHING_M
-        return bool((self.resists < min(LEAD, self.force_lead))[apart].any())
+        return bool((self.resists < min(LEAD, self.force_lead))[self.closures < self.closed_from].any())
 
 
 def measure_gripper(scene: Simulated) -> GripperTravel | None:
@@ -189,6 +198,14 @@ def rising(closures: FloatArray) -> IntArray:
     return np.append(before, before[-1:] + 1)
 
 
+def closed_from(closures: FloatArray, openings_m: FloatArray) -> float:
+    """Return the closure from which on a gripper with these samples (k,) counts as closed."""
+    first = int(np.argmax(openings_m <= openings_m[-1] + NOTHING_M))
+    low, high = max(first - 1, 0), first
+    share = np.interp(-(openings_m[-1] + NOTHING_M), -openings_m[[low, high]], [0.0, 1.0])
+    return max(float(closures[low] + share * (closures[high] - closures[low])), float(closures[-1]) - _CLOSED)
+
+
 def resistance(
     run: ClosingRun, references: FloatArray, closures: FloatArray, openings_m: FloatArray
 ) -> tuple[float, FloatArray]:
@@ -199,8 +216,7 @@ def resistance(
     behind = run.references - np.interp(run.closures, closures, references)
     fast = (run.speeds > 0.5 * run.speeds.max()) & (run.closures > 0.1) & (run.closures < 0.9)
     lag_s = max(float(np.median(behind[fast] / run.speeds[fast])), 0.0) if fast.any() else 0.0
-    open_m = np.interp(run.closures, closures, openings_m)
-    alone = (np.abs(run.speeds) < 2.0 * STANDING_SPEED_1_S) & (open_m > openings_m[-1] + NOTHING_M)
+    alone = (np.abs(run.speeds) < 2.0 * STANDING_SPEED_1_S) & (run.closures < closed_from(closures, openings_m))
     # For as long as fingers have to rest; they also rest as they begin to move.
     steps = round(STANDING_TIME_S / run.step_s)
     lasts = sliding_window_view(np.where(alone, behind - lag_s * run.speeds, 0.0), steps).min(axis=1)
@@ -211,7 +227,7 @@ def sags(
     rests: FloatArray, told: FloatArray, references: FloatArray, closures: FloatArray, openings_m: FloatArray
 ) -> FloatArray:
     """Return how far (k,) fingers under their weight, at `rests` (n,) if `told` (n,), lag at the samples."""
-    free = np.interp(rests, closures, openings_m) > openings_m[-1] + NOTHING_M
+    free = rests < closed_from(closures, openings_m)
     leads, order = np.where(free, told - np.interp(rests, closures, references), 0.0), rests.argsort()
     # Where the whole weight lets nothing rest, a part of it does.
     return np.maximum(_beside(closures, rests, leads), np.interp(closures, rests[order], leads[order]))

@@ -9,7 +9,6 @@ from common.arrays import FloatArray, IntArray
 from robot_side.compiled.kernel import building_block, inlined
 from robot_side.drivers.mujoco.gripper_measurement import (
     LEAD,
-    NOTHING_M,
     STANDING_SPEED_1_S,
     STANDING_TIME_S,
     GripperTravel,
@@ -75,7 +74,7 @@ class GripperDrive:
             [travel.closures, travel.references, travel.openings_m, travel.resists]
         )
         """(k, 4) closure, reference, opening, and lead that the gripper itself resists, along the travel"""
-        self._travel = travel
+        self._travel, self._closed_from = travel, travel.closed_from
         self._opening_m, self._standing_s = self.drive["opening_m"], self.drive["standing_s"]
         self._command = 0.0
         self._valid_until_s = -math.inf
@@ -121,8 +120,7 @@ class GripperDrive:
 
         Never where they stop by themselves: at the gap of the closed gripper, or where it hinders itself.
         """
-        apart_m = self._opening_m[0] - self._travel.openings_m[-1]
-        return bool(self._standing_s[0] >= STANDING_TIME_S and apart_m > NOTHING_M)
+        return bool(self._standing_s[0] >= STANDING_TIME_S and self.drive["closure"][0] < self._closed_from)
 
 
 @inlined

@@ -12,6 +12,7 @@ from common.errors import ConfigurationError
 from robot_side.compiled.kernel import FLOAT64, compiled, output_array, record_array
 from robot_side.drivers.mujoco.gripper_measurement import (
     candidate_ends,
+    closed_from,
     measure_gripper,
     open_gap,
     resistance,
@@ -41,6 +42,12 @@ def test_what_slow_fingers_alone_resist_is_told_from_their_lag() -> None:
     lag_s, resists = resistance(run, samples, samples, 0.08 * (1.0 - samples))
     assert lag_s == pytest.approx(0.1, abs=1e-3)
     np.testing.assert_allclose(resists, [0.0, 0.0, 0.25, 0.25, 0.0, 0.0], atol=6e-3)
+
+
+@pytest.mark.parametrize(("gone_m", "closed"), [(1.0, 0.9875), (0.9, 0.95), (0.6, 0.95)])
+def test_fingers_that_meet_beside_the_tool_before_they_have_closed_may_hold_on(gone_m: float, closed: float) -> None:
+    closures = np.linspace(0.0, 1.0, 11)
+    assert closed_from(closures, np.maximum(0.08 * (1.0 - closures / gone_m), 0.0)) == pytest.approx(closed)
 
 
 def test_a_servo_lags_by_all_damping(tmp_path: Path) -> None:
