@@ -161,4 +161,5 @@ def test_starts_turns_stops_and_a_reset_are_no_fault() -> None:
     bench.drive(0.3, operator)
     bench.silence(0.3)
     assert bench.ticks * TICK_S > 3.0
-    assert bench.robot.summary()["following"] == {"noticed": {}, "held": 0}
+    summary = bench.robot.summary()
+    assert (summary["following"], summary["ticks"]) == ({"noticed": {}, "held": 0}, bench.ticks)
