@@ -29,7 +29,8 @@ def processes(workers: int) -> Iterator[Executor]:
         # The workers inherit that SIGINT is ignored: only this process reacts to Ctrl-C.
         before = signal.signal(signal.SIGINT, signal.SIG_IGN)
         try:
-            pool.submit(os.getpid)
+            for _ in range(workers):  # each starts one, as none is idle yet
+                pool.submit(os.getpid)
         finally:
             signal.signal(signal.SIGINT, before)
         yield pool

@@ -5,19 +5,21 @@ import importlib
 import json
 import sys
 from collections.abc import Iterator, Sequence
-from concurrent.futures import Future, as_completed
+from concurrent.futures import FIRST_COMPLETED, Future, wait
 from dataclasses import dataclass
 from typing import Any
 
 import msgspec
 import numpy as np
 
+from common.command.stop_signal import StopSignal
 from common.errors import ConfigurationError, FeelaheadError
 from feelahead.lab.executors import cluster, processes
 from feelahead.lab.table import Row
 from feelahead.printing.progress import Shown
 
 _WORKERS = 2
+_LOOK_S = 0.2
 
 
 @dataclass(frozen=True)
@@ -45,7 +47,10 @@ class Piece:
 def results(
     question: Any, settings: Any, todo: Sequence[Piece], shown: Shown
 ) -> Iterator[tuple[Piece, list[Row] | str]]:
-    """Run all pieces in `todo`; yield each when it has ended, with its rows, or with the failure as text."""
+    """Run all pieces in `todo`; yield each when it has ended, with its rows, or with the failure as text.
+
+    Raise KeyboardInterrupt after a stop signal.
+    """
     module = question.run.__module__
     if not todo:
         return
@@ -61,17 +66,23 @@ def results(
     else:
         pool = processes(settings.workers or _WORKERS)
     left = list(todo)
-    with pool as executor:
+    # A flag, as an exception that a signal's handler raises may be lost in a callback.
+    with StopSignal() as stop, pool as executor:
         futures: dict[Future[list[Row] | str], Piece] = {
             executor.submit(run_piece, module, piece.cell, piece.seed): piece for piece in left
         }
         shown.begin(str(left[0]))
-        for future in as_completed(futures):
-            found = future.result()
-            left.remove(futures[future])
-            if left:
-                shown.begin(str(left[0]))  # the piece that has waited longest
-            yield futures[future], found
+        waiting = set(futures)
+        while waiting:
+            ended, waiting = wait(waiting, _LOOK_S, FIRST_COMPLETED)
+            for future in ended:
+                found = future.result()
+                left.remove(futures[future])
+                if left:
+                    shown.begin(str(left[0]))  # the piece that has waited longest
+                yield futures[future], found
+            if stop.is_set and waiting:
+                raise KeyboardInterrupt
 
 
 def run_piece(module: str, cell: Any, seed: int) -> list[Row] | str:

@@ -8,7 +8,9 @@ import shutil
 import signal
 import subprocess
 import sys
+import weakref
 from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -20,9 +22,12 @@ from pyarrow import parquet
 
 from common.errors import ConfigurationError
 from feelahead.commands.bench_and_try import try_out
+from feelahead.lab import pieces
 from feelahead.lab.intervals import mcnemar_p, mean_interval, share_interval, student_interval, welch_interval
 from feelahead.lab.journal import Journal
+from feelahead.lab.pieces import Piece, results
 from feelahead.lab.sweep import ask, generator, sweep
+from feelahead.printing.progress import Shown
 from tests.feelahead.lab import counting
 from tests.feelahead.lab.counting import QUESTION, TIMED, Cell, Counting, held
 from tests.helpers.machines.waiting import LIMIT_S, wait_until
@@ -275,6 +280,25 @@ def test_ctrl_c_ends_with_130_and_says_how_to_go_on(tmp_path: Path, expected: by
     assert rows.exists()
     held(tmp_path, 4).unlink()
     assert _without_folder(_asked(tmp_path, *grid[len(_GRID) : -2])) == _without_folder(expected)
+
+
+def test_no_moment_loses_a_stop_signal(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    class Dropping(Shown):
+        """Progress that gets the signal while an object is dropped, where an exception would be lost."""
+
+        def begin(self, piece: str) -> None:
+            if piece == str(todo[1]):
+                held(tmp_path, 2).unlink()
+                return
+            dropped = {1}
+            self._reference = weakref.ref(dropped, lambda _: signal.raise_signal(signal.SIGINT))
+            del dropped
+
+    monkeypatch.setattr(pieces, "processes", ThreadPoolExecutor)
+    held(tmp_path, 2).touch()
+    todo = [Piece(Cell(number, str(tmp_path)), 0) for number in (1, 2)]
+    with pytest.raises(KeyboardInterrupt):
+        list(results(QUESTION, Counting(workers=2), todo, Dropping("counting", 2.0, None)))
 
 
 @pytest.mark.processes
