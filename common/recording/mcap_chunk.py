@@ -26,9 +26,7 @@ def records_of(chunk: Any) -> Iterator[Any]:
         opcode, length = _HEAD.unpack_from(content, place)
         place += _HEAD.size
         if length > len(content) - place:
-            raise ValueError(
-                f"a record of {length} bytes; valid: at most {len(content) - place}, the rest of its chunk"
-            )
+            raise ValueError(f"a record of {length} bytes; valid: at most the {len(content) - place} left in the chunk")
         body = ReadDataStream(io.BytesIO(content[place : place + length]))
         if opcode == Opcode.CHANNEL:
             yield Channel.read(body)
@@ -52,7 +50,7 @@ def _unpacked(chunk: Any) -> bytes:
     while piece := packed.read(min(_PIECE_BYTES, chunk.uncompressed_size + 1 - len(content))):
         content += piece
     if len(content) != chunk.uncompressed_size:
-        raise ValueError(f"uncompressed_size = {chunk.uncompressed_size}; valid: {len(content)}, or what it states")
+        raise ValueError(f"uncompressed_size = {chunk.uncompressed_size}; valid: the number of bytes in the chunk")
     if chunk.uncompressed_crc not in (0, zlib.crc32(content)):
         raise ValueError(f"uncompressed_crc = {chunk.uncompressed_crc}; valid: {zlib.crc32(content)}")
     return bytes(content)

@@ -47,7 +47,7 @@ class Recording:
     began_ns: int
     """Oldest stamp of our own topics, in nanoseconds on the wall clock"""
     end_ns: int
-    """Newest stamp of them"""
+    """Newest stamp of our own topics"""
     _parts: tuple[Part, ...]
     """Parts of the file by their oldest stamps"""
     _names: Mapping[int, str]

@@ -17,7 +17,7 @@ _MET = 1e-6
 _LEAST_SPEED_M_S = 1e-6
 _LEAST_RATE_RAD_S = 1e-9
 FOUND: Final = 3
-"""How many numbers `find_ability` fills before the joints' rates"""
+"""Number of values that `find_ability` fills before the joints' rates"""
 _twist = on_stack(6)
 
 

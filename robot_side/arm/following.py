@@ -45,7 +45,7 @@ class Following:
         """names (n,): the joints'; without them their numbers are told. sigma_rad: standard deviation of a reading."""
         count = len(limits.velocity_rad_s)
         self.text: str | None = None
-        """How the arm does not follow, in words; None if it follows"""
+        """Words for the joints' worst fault; None if the arm follows"""
         self.stop: str | None = None
         """Why the arm must stop; None if it need not"""
         self.errors_rad_s: FloatArray | None = None

@@ -54,10 +54,10 @@ class Fault(IntEnum):
     NONE = 0
     SLOW = 1
     FAR = 2
-    """It moves faster than commanded, or on after the command."""
+    """Motion that is faster than commanded, or goes on after the command."""
     STILL = 3
     ASTRAY = 4
-    """It moves in the other direction, or without a command."""
+    """Motion in the other direction, or without a command."""
 
 
 TRACK: Final = np.dtype(

@@ -67,9 +67,9 @@ class GripperTravel:
     force_lead: float
     """Lead beyond the first lag that gives the servo's largest force, as a share of the stroke; infinite without one"""
     opening_force_lead: float
-    """The same when the gripper opens: a servo may pull only"""
+    """Such a lead when the gripper opens; another one where a servo pulls only"""
     ahead_m: float
-    """How far the fingers reach ahead of the tool's site, open or closed, in m"""
+    """Reach of the fingers ahead of the tool's site, open or closed, in m"""
     closing: FloatArray
     """(3,) direction in the frame of the tool's site along which the jaws close, from the first jaw to the second"""
     jaws: tuple[Jaw, Jaw]

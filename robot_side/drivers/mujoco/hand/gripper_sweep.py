@@ -54,7 +54,7 @@ class GripperSweep:
     """(k, g) lengths of the actuators there, each in the unit of its transmission"""
     poses: HandPoses
     ahead_m: float
-    """How far the fingers reach ahead of the tool's site, open or closed, in m"""
+    """Reach of the fingers ahead of the tool's site, open or closed, in m"""
 
     @property
     def per_length(self) -> FloatArray:
