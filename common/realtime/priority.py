@@ -1,5 +1,6 @@
 """Priority of a side's process over other programs on the machine, as far as the system permits it."""
 
+import atexit
 import contextlib
 import ctypes
 import os
@@ -16,6 +17,8 @@ _CAP_IPC_LOCK = 14
 """Number of the capability in linux/capability.h"""
 _MCL_CURRENT, _MCL_FUTURE, _MCL_ONFAULT = 1, 2, 4
 """Flags of mlockall in asm-generic/mman.h"""
+_SESSION = Path("/proc/self/autogroup")
+"""Niceness of the whole login session, where Linux groups processes by session (autogroup)"""
 
 
 def raise_priority() -> bool:
@@ -24,9 +27,12 @@ def raise_priority() -> bool:
     for thread in _threads():
         with contextlib.suppress(OSError):
             os.setpriority(os.PRIO_PROCESS, thread, _NICENESS)
-    # If Linux groups processes by session (autogroup), a thread's niceness counts only within its session.
+    # Where there is an autogroup, a thread's niceness counts only within its session.
     with contextlib.suppress(OSError):
-        Path("/proc/self/autogroup").write_text(str(_NICENESS), encoding="ascii")
+        before = int(_SESSION.read_text(encoding="ascii").split()[-1])
+        if before > _NICENESS:  # not raised by the other side, which restores it
+            _SESSION.write_text(str(_NICENESS), encoding="ascii")
+            atexit.register(_restore_session, before)
     return os.getpriority(os.PRIO_PROCESS, 0) <= _NICENESS
 
 
@@ -73,6 +79,11 @@ def _may_lock_without_limit() -> bool:
         if line.startswith("CapEff:"):
             return bool(int(line.split()[1], 16) >> _CAP_IPC_LOCK & 1)
     return False
+
+
+def _restore_session(niceness: int) -> None:
+    with contextlib.suppress(OSError):
+        _SESSION.write_text(str(niceness), encoding="ascii")
 
 
 def _threads() -> list[int]:

@@ -28,6 +28,20 @@ def test_every_thread_is_raised_not_only_the_one_that_asks() -> None:
 
 
 @pytest.mark.processes
+@pytest.mark.skipif(not Path("/proc/self/autogroup").exists(), reason="Linux groups no processes by session here")
+def test_the_session_has_its_old_priority_afterwards() -> None:
+    side = f"{sys.executable} -c 'from common.realtime.priority import raise_priority; raise_priority()'"
+    said = subprocess.run(
+        ["/bin/sh", "-c", f"cat /proc/self/autogroup; {side}; cat /proc/self/autogroup"],
+        capture_output=True,
+        text=True,
+        check=True,
+        start_new_session=True,
+    ).stdout.splitlines()
+    assert said[0] == said[1]
+
+
+@pytest.mark.processes
 def test_realtime_is_granted_or_a_note_names_the_command_that_permits_it() -> None:
     said = run(
         "import os\nfrom common.realtime.priority import make_realtime\n"
