@@ -28,8 +28,7 @@ from robot_side.gripper.grip import Grip
 from robot_side.gripper.held_covers import HeldCovers
 from robot_side.gripper.perceived_distances import perceived_distances
 from robot_side.homing import CLEAR_M, Homing
-from robot_side.laws.law import Law, Situation
-from robot_side.laws.sensed import Sensed
+from robot_side.laws.law import Law
 from robot_side.motion import Motion
 from robot_side.operators.operator_session import OperatorSession
 from robot_side.outcome.figures import Observer, RunFigures
@@ -39,6 +38,8 @@ from robot_side.reporting.reports import Reports
 from robot_side.surroundings.distances import object_distances
 from robot_side.surroundings.perceived import ObjectSource
 from robot_side.surroundings.surroundings import Sight, Surroundings
+from robot_side.tick.sensed import Sensed
+from robot_side.tick.situation import Situation
 
 _TRIED_RAD: Final = 0.1
 _LEVER_M: Final = 0.1

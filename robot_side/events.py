@@ -9,11 +9,11 @@ from typing import Final, Literal, NamedTuple, get_args
 from common.arrays import FloatArray
 from common.episode import EpisodeMark
 from robot_side.arm.port import ArmState
-from robot_side.laws.law import Situation
-from robot_side.laws.sensed import Sensed
 from robot_side.operators.safety import Permission
 from robot_side.reporting.outgoing_messages import Outgoing
 from robot_side.surroundings.perceived import PerceivedObjects
+from robot_side.tick.sensed import Sensed
+from robot_side.tick.situation import Situation
 
 Step = Literal["arm", "pose", "grip", "motion", "law", "messages", "listeners", "frame", "end"]
 """Steps of a turn, in their order. A simulated arm advances its physics in `arm`. In `frame`, after the messages to

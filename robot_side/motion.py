@@ -11,8 +11,8 @@ from robot_side.arm.port import Arm, ArmState, GripperPose
 from robot_side.arm.speed_assist import assisted
 from robot_side.arm.tool_motion import ToolMotionSettings
 from robot_side.gripper.grip import Grip
-from robot_side.laws.sensed import Sensed
 from robot_side.operators.safety import Permission
+from robot_side.tick.sensed import Sensed
 
 
 class Motion:

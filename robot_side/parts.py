@@ -39,7 +39,6 @@ from robot_side.drivers.remote.frame_message import perceived
 from robot_side.enlargement.prediction_errors import BUILT_IN, PredictionErrors, load_prediction_errors
 from robot_side.gripper.held_covers import HeldCovers
 from robot_side.gripper.kept_covers import SearchNotes
-from robot_side.laws.explanation import Explains
 from robot_side.laws.named import LAWS
 from robot_side.operators.episodes import Episodes
 from robot_side.operators.operator_session import OperatorSession
@@ -49,6 +48,7 @@ from robot_side.outcome.figures import RunFigures
 from robot_side.settings import RobotSettings
 from robot_side.surroundings.perceived import KINDS, PerceivedObjects
 from robot_side.surroundings.surroundings import Surroundings
+from robot_side.tick.explained import Explains
 from robot_side.viewing.viewpoints import stick_frames
 
 _NAMED_OBJECTS = 8

@@ -18,7 +18,7 @@ from robot_side.field.object_class import SKIPPED
 from robot_side.field.scratch import STRENGTHS
 from robot_side.laws.memory import MOST_PLACES, memory_at
 from robot_side.laws.path import move
-from robot_side.laws.sensed import HORIZON, L2, NUMBERS_PER_SIDE, R2
+from robot_side.tick.sensed import HORIZON, L2, NUMBERS_PER_SIDE, R2
 
 FIRST_PROBE: Final = 1 + MOST_PLACES
 """Number of the first probe, counted after the places on the path"""

@@ -1,8 +1,6 @@
 """Terms of the enlargement and overlap with each object, for display. They are computed on request only."""
 
 import math
-from dataclasses import dataclass
-from typing import Literal, Protocol
 
 import numpy as np
 
@@ -12,31 +10,9 @@ from robot_side.arm.port import GripperPose
 from robot_side.field.along import Along
 from robot_side.field.inflation import explain_inflation
 from robot_side.field.total_overlap import total_overlap_m3
-from robot_side.laws.law import Situation
-from robot_side.laws.sensed import Sensed
 from robot_side.surroundings.scene_table import SceneTable
-
-Trigger = Literal["l2", "r2"]
-Overlaps = dict[int, float]
-"""Overlap in m³, keyed by the object's index; objects without overlap are left out"""
-
-
-@dataclass(frozen=True)
-class TriggerExplained:
-    """Enlargement and overlaps along one trigger."""
-
-    terms: EnlargementTerms
-    overlaps_m3: Overlaps
-    """Overlaps (eq. 11-12) of the enlarged gripper. swept: inflated by D_σ and moved by the robot side's δ. paper:
-    inflated by D_incr and not moved."""
-
-
-class Explains(Protocol):
-    """Interface of a law that can explain its result."""
-
-    def explain(self, trigger: Trigger, situation: Situation, sensed: Sensed) -> TriggerExplained:
-        """Return the terms and overlaps behind one trigger's field in `sensed`, which the law found for `situation`."""
-        ...
+from robot_side.tick.explained import Overlaps
+from robot_side.tick.situation import Situation
 
 
 def enlargement_terms(

@@ -15,7 +15,7 @@ from robot_side.compiled.vectors import Vector, dot, norm
 from robot_side.field.scratch import STRENGTHS
 from robot_side.laws.memory import ROOM, memory_at
 from robot_side.laws.prospect import horizon_m
-from robot_side.laws.sensed import (
+from robot_side.tick.sensed import (
     ACCELERATION,
     DISPLACEMENT,
     ENLARGEMENT,

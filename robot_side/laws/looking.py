@@ -22,7 +22,7 @@ from robot_side.laws.memory import Kernel, Total, memory_at
 from robot_side.laws.path import go_to
 from robot_side.laws.prospect import FIND_PROSPECT, stopping
 from robot_side.laws.recent_looks import keep, longest_waiting
-from robot_side.laws.sensed import L2, R2
+from robot_side.tick.sensed import L2, R2
 
 OVERLAP_PERIOD_S: Final = 0.02
 """Period at which the overlap at δ is computed; this figure is for display only"""

@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, Final, Literal, Protocol
 
 if TYPE_CHECKING:
-    from robot_side.laws.explanation import Explains
     from robot_side.laws.law import Law
+    from robot_side.tick.explained import Explains
 
     class NamedLaw(Law, Explains, Protocol):
         """Interface of a law that a robot side can run: it senses, explains its result, and takes another P."""

@@ -22,10 +22,11 @@ from robot_side.enlargement.distance import Uncertainty, plain_enlargements_m
 from robot_side.enlargement.kinematic_error import position_covariance
 from robot_side.field.object_class import OBSTACLE, SKIPPED
 from robot_side.field.total_overlap import total_overlap_m3
-from robot_side.laws.explanation import Trigger, TriggerExplained, moved_and_inflated, overlaps_by_object
-from robot_side.laws.law import Situation
-from robot_side.laws.sensed import Sensed
+from robot_side.laws.explanation import moved_and_inflated, overlaps_by_object
 from robot_side.surroundings.surroundings import Surroundings
+from robot_side.tick.explained import Trigger, TriggerExplained
+from robot_side.tick.sensed import Sensed
+from robot_side.tick.situation import Situation
 
 REFERENCE_SHARE: Final = 0.05
 """f, the share of the spheres' volume that must overlap for full strength. The paper gives no value. A smaller f gives

@@ -19,7 +19,7 @@ from robot_side.compiled.columns import BUNDLE
 from robot_side.compiled.kernel import FLOAT64, INT64, compiled, inlined, input_array
 from robot_side.compiled.vectors import Vector, add, cross, load, norm, scale, subtract, unit
 from robot_side.laws.memory import EVEN_PLACES, memory_at
-from robot_side.laws.sensed import L2
+from robot_side.tick.sensed import L2
 
 SPACING_M: Final = 0.015
 """Largest motion of any sphere between two places: less than the width of an inflated fingertip's sphere. On a path

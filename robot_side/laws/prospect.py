@@ -12,7 +12,7 @@ from robot_side.compiled.kernel import BOOL, FLOAT64, INT64, compiled, inlined, 
 from robot_side.compiled.vectors import load, norm
 from robot_side.enlargement.prediction_errors import prediction_error
 from robot_side.laws.memory import Kernel, memory_at
-from robot_side.laws.sensed import R2, STICK
+from robot_side.tick.sensed import R2, STICK
 
 BEYOND_M: Final = 0.05
 """Distance examined beyond the stopping distance (loop age, reaction and braking), because the loop age varies"""

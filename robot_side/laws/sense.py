@@ -28,7 +28,7 @@ from robot_side.laws.memory import Kernel, memory_at
 from robot_side.laws.path import plan_places
 from robot_side.laws.prospect import FIELD_PERIOD_S, FIND_PROSPECT, stopping
 from robot_side.laws.recent_looks import longest_ago, look_from
-from robot_side.laws.sensed import ENLARGEMENT, L2, OVERLAP, R2, STICK
+from robot_side.tick.sensed import ENLARGEMENT, L2, OVERLAP, R2, STICK
 
 _find_prospect = call_at_address(BOOL, FIND_PROSPECT)
 

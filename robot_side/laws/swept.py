@@ -32,23 +32,18 @@ from robot_side.field.object_class import OBSTACLE, SKIPPED, TARGET, TOUCHABLE
 from robot_side.field.scratch import Count, Scratch
 from robot_side.field.total_overlap import sum_overlaps
 from robot_side.laws.around import STILL_M_S, ways_around
-from robot_side.laws.explanation import (
-    Trigger,
-    TriggerExplained,
-    enlargement_terms,
-    moved_and_inflated,
-    overlaps_by_object,
-)
+from robot_side.laws.explanation import enlargement_terms, moved_and_inflated, overlaps_by_object
 from robot_side.laws.felt import felt_array
-from robot_side.laws.law import Situation
 from robot_side.laws.memory import Memory, Total
 from robot_side.laws.path import go_to_place
 from robot_side.laws.prospect import find_prospect, stopping_s
 from robot_side.laws.sense import sense
-from robot_side.laws.sensed import L2, NUMBERS, R2, Sensed
 from robot_side.surroundings.perceived import PerceivedObjects
 from robot_side.surroundings.scene_table import SceneTable
 from robot_side.surroundings.surroundings import Surroundings
+from robot_side.tick.explained import Trigger, TriggerExplained
+from robot_side.tick.sensed import L2, NUMBERS, R2, Sensed
+from robot_side.tick.situation import Situation
 
 _NO_VELOCITIES: Final[FloatArray] = np.empty((0, 3))
 

@@ -11,7 +11,8 @@ from common.episode import EpisodeMark
 from common.roles import Role
 from common.statistics import BLOCK, RunningStatistics
 from robot_side.events import Listener, Tick
-from robot_side.laws.sensed import (
+from robot_side.outcome.placing import Placing, scaled
+from robot_side.tick.sensed import (
     ENLARGEMENT,
     L2,
     NUMBERS,
@@ -23,7 +24,6 @@ from robot_side.laws.sensed import (
     TOOL_SPEED,
     Sensed,
 )
-from robot_side.outcome.placing import Placing, scaled
 
 if TYPE_CHECKING:
     from robot_side.outcome.truth import Truth

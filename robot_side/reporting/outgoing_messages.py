@@ -14,8 +14,8 @@ from robot_side.arm.hindrance import Hindrance
 from robot_side.arm.port import ArmState, GripperPose
 from robot_side.arm.stick_frames import StickFrames
 from robot_side.laws.law import Law
-from robot_side.laws.sensed import L2, R2, Sensed
 from robot_side.operators.operator_session import Receiver
+from robot_side.tick.sensed import L2, R2, Sensed
 
 OutgoingStream = Literal["haptics", "telemetry", "video", "scene"]
 TOPICS: Final[dict[OutgoingStream, bytes]] = {"telemetry": b"telemetry", "video": VIDEO_TOPIC, "scene": SCENE_TOPIC}

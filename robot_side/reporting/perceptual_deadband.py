@@ -24,7 +24,7 @@ from common.protocol.messages import MotionCommand, MotionState, Telemetry
 from common.reaction import WRITE_S
 from common.silence import KEEP_ALIVE_S
 from robot_side.compiled.kernel import BOOL, FLOAT64, INT64, compiled, inlined, input_array, output_array, record_array
-from robot_side.laws.sensed import (
+from robot_side.tick.sensed import (
     ACCELERATION,
     DISPLACEMENT,
     FULL_SPEED,

@@ -11,13 +11,14 @@ from common.protocol.messages import MotionState
 from robot_side.arm.hindrance import Hindrance
 from robot_side.arm.port import ArmState
 from robot_side.arm.stick_frames import StickFrames
-from robot_side.laws.law import Law, Situation
-from robot_side.laws.sensed import Sensed
+from robot_side.laws.law import Law
 from robot_side.motion import Motion
 from robot_side.operators.operator_session import OperatorSession
 from robot_side.operators.safety import Permission
 from robot_side.reporting.outgoing_messages import MapSchedule, Outgoing, stiffness_message, telemetry
 from robot_side.reporting.perceptual_deadband import StiffnessDeadband, TelemetryDeadband
+from robot_side.tick.sensed import Sensed
+from robot_side.tick.situation import Situation
 
 OBSERVER_PERIOD_S: Final = 0.02
 """Period of the stiffness messages to observers, in seconds"""

@@ -14,12 +14,12 @@ from common.protocol.view_messages import Eye, Near, SceneShapes, SceneState, Sh
 from common.roles import ROLES, Role
 from robot_side.drivers.mujoco.kinematics import MujocoKinematics
 from robot_side.gripper.perceived_distances import perceived_distances
-from robot_side.laws.explanation import Explains, Trigger, TriggerExplained
-from robot_side.laws.law import Situation
-from robot_side.laws.sensed import Sensed
 from robot_side.reporting.outgoing_messages import SHOWN_NAME
 from robot_side.surroundings.perceived import PerceivedObjects
 from robot_side.surroundings.surroundings import Surroundings
+from robot_side.tick.explained import Explains, Trigger, TriggerExplained
+from robot_side.tick.sensed import Sensed
+from robot_side.tick.situation import Situation
 from robot_side.viewing.shapes import SceneModel, bytes_of
 
 _TRIGGERS: Final[tuple[Trigger, Trigger]] = ("l2", "r2")

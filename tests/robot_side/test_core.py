@@ -14,9 +14,9 @@ from robot_side.core import RobotSide
 from robot_side.drivers.mujoco.scene import load_scene
 from robot_side.events import Listener, Tick
 from robot_side.gripper.held_object import grip
-from robot_side.laws.law import Situation
 from robot_side.parts import build_parts
 from robot_side.settings import RobotSettings
+from robot_side.tick.situation import Situation
 from tests.robot_side.session_bench import Bench, Operator
 
 

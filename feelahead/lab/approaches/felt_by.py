@@ -21,11 +21,11 @@ from robot_side.drivers.mujoco.joint_reference import MotionLimits
 from robot_side.enlargement.distance import Uncertainty
 from robot_side.enlargement.prediction_errors import BUILT_IN, PredictionErrors, load_prediction_errors
 from robot_side.laws.law import Law as RobotLaw
-from robot_side.laws.law import Situation
 from robot_side.laws.paper import PaperLaw
-from robot_side.laws.sensed import Sensed
 from robot_side.laws.swept import SweptLaw
 from robot_side.surroundings.perceived import PerceivedObjects
+from robot_side.tick.sensed import Sensed
+from robot_side.tick.situation import Situation
 
 _TRAVEL: Final = TriggerTravel()
 _FRAME_S: Final = 1.0 / 30.0

@@ -14,9 +14,9 @@ from operator_side.settings import OperatorSettings
 from robot_side import events
 from robot_side.drivers.mujoco.scene import Scene, load_scene
 from robot_side.events import Listener
-from robot_side.laws.law import Situation
 from robot_side.laws.swept import SweptLaw
 from robot_side.settings import RobotSettings
+from robot_side.tick.situation import Situation
 
 DEMO: Final = "demo"
 FORCE_N: Final = 2.0

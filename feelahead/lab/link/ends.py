@@ -23,10 +23,10 @@ from operator_side.controller.state import ControllerState
 from operator_side.core import OperatorSide
 from operator_side.core_settings import CoreSettings
 from operator_side.robot_link.commanding import ToRobot
-from robot_side.laws.sensed import Sensed
 from robot_side.operators.operator_session import OperatorSession
 from robot_side.operators.safety import Safety, SafetySettings
 from robot_side.reporting.outgoing_messages import Outgoing, stiffness_message
+from robot_side.tick.sensed import Sensed
 
 BYTES: Final = (169, 138)
 """Sizes in bytes of a stiffness update and of a motion command; bare ends send messages of these sizes."""

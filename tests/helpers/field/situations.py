@@ -11,12 +11,13 @@ from robot_side.arm.port import GripperPose
 from robot_side.arm.tool_motion import ToolMotionSettings
 from robot_side.enlargement.distance import Uncertainty
 from robot_side.enlargement.prediction_errors import PredictionErrors
-from robot_side.laws.law import Law, Situation
+from robot_side.laws.law import Law
 from robot_side.laws.paper import PaperLaw
-from robot_side.laws.sensed import Sensed
 from robot_side.laws.swept import SweptLaw
 from robot_side.surroundings.perceived import PerceivedObjects
 from robot_side.surroundings.surroundings import Surroundings
+from robot_side.tick.sensed import Sensed
+from robot_side.tick.situation import Situation
 from tests.helpers.field.fields import RADIUS_M, ball_pose
 from tests.helpers.perceived_scenes import Scene
 

@@ -14,7 +14,7 @@ from robot_side.laws.felt import felt_array
 from robot_side.laws.memory import ROOM, Memory
 from robot_side.laws.prospect import BEYOND_M
 from robot_side.laws.recent_looks import STEADY_S
-from robot_side.laws.sensed import (
+from robot_side.tick.sensed import (
     ACCELERATION,
     DISPLACEMENT,
     ENLARGEMENT,

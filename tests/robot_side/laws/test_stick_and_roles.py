@@ -10,8 +10,8 @@ from common.reaction import HORIZON_S
 from common.roles import Role
 from common.touch_speed import touch_speed_m_s
 from robot_side.gripper.held_object import grip, with_held
-from robot_side.laws.sensed import Sensed
 from robot_side.surroundings.perceived import PerceivedObjects
+from robot_side.tick.sensed import Sensed
 from tests.helpers.field.fields import AHEAD, RADIUS_M, ball_pose
 from tests.helpers.field.situations import ACCELERATION_M_S2, SIGMA_M, STICK_SPEED_M_S, Senses
 from tests.helpers.gripper_poses import OPENING_M, free_pose, gripper_pose

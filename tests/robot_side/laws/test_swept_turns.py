@@ -9,7 +9,7 @@ import pytest
 from common.arrays import FloatArray
 from robot_side.laws.prospect import FIELD_PERIOD_S
 from robot_side.laws.recent_looks import STEADY_S
-from robot_side.laws.sensed import L2, R2, STICK
+from robot_side.tick.sensed import L2, R2, STICK
 from tests.helpers.field.fields import EQUAL_M, ball_pose
 from tests.helpers.field.situations import Senses, at, situation, swept, walls
 from tests.helpers.gripper_poses import free_pose

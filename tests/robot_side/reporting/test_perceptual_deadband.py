@@ -12,8 +12,8 @@ from common.following import follow
 from common.protocol.messages import Compensation, Header, MotionCommand, MotionState, Telemetry
 from common.reaction import WRITE_S
 from common.silence import KEEP_ALIVE_S
-from robot_side.laws.sensed import Sensed
 from robot_side.reporting.perceptual_deadband import StiffnessDeadband, TelemetryDeadband
+from robot_side.tick.sensed import Sensed
 from tests.helpers.felt import field, onsets
 
 TICK_S = 1e-3

@@ -12,10 +12,10 @@ from common.protocol.view_messages import SceneShapes, SceneState, Shape
 from common.roles import Role
 from robot_side.core import RobotSide
 from robot_side.drivers.mujoco.scene import Scene, load_scene
-from robot_side.laws.law import Situation
-from robot_side.laws.sensed import Sensed
 from robot_side.parts import build_parts
 from robot_side.settings import RobotSettings
+from robot_side.tick.sensed import Sensed
+from robot_side.tick.situation import Situation
 from robot_side.viewing import scene_view
 from robot_side.viewing.scene_view import SceneView, TickFigures
 from robot_side.viewing.shapes import SceneModel

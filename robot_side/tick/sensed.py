@@ -7,7 +7,7 @@ import numpy as np
 
 from common.arrays import FloatArray, require_finite
 from common.protocol.messages import OnsetDistances, TriggerField
-from robot_side.field.scratch import STRENGTHS
+from common.protocol.uniform_field import STRENGTHS
 
 R2, L2, STICK = 0, 1, 2
 """Numbers of the sides along which a law looks: the directions of both triggers and of the deflected stick"""
