@@ -13,24 +13,26 @@ from common.emulation.spec import unused_clauses
 from common.loop.loop import Loop
 from common.loop.process import Process
 from common.realtime.priority import raise_descriptor_limit
+from common.recording.provenance import provenance
 from common.sockets.authentication import RobotKeys
 from common.sockets.robot import RobotSockets
 from robot_side.compiled.kernel import late_kernels
-from robot_side.compiled.warm_up import warm_up
-from robot_side.core import RobotParts, RobotSide
+from robot_side.compiled.warm_up import kernel_digests, warm_up
+from robot_side.core.robot_parts import RobotParts
+from robot_side.core.robot_side import RobotSide
+from robot_side.drivers.mujoco.viewpoints import first_person_eye, overview_eye
 from robot_side.drivers.remote.connected_drivers import ConnectedDrivers
-from robot_side.events import Listener
 from robot_side.parts import build_parts
-from robot_side.recording.recorder import Recorder, RobotEncoder, robot_header
-from robot_side.reporting.sending import SENT_STREAMS
+from robot_side.recording.recorder import Recorder, RobotEncoder
 from robot_side.settings import RobotSettings
+from robot_side.tick.events import Listener
+from robot_side.tick.outgoing import SENT_STREAMS
 from robot_side.tick_times import PhysicsTime
 from robot_side.turns import RobotTurns
 from robot_side.viewing.perceived_shapes import PerceivedModel
 from robot_side.viewing.pictures import Cameras
 from robot_side.viewing.scene_view import SceneView
 from robot_side.viewing.shapes import SceneModel
-from robot_side.viewing.viewpoints import first_person_eye, overview_eye
 
 TICK_PERIOD_S: Final = 1e-3
 _COMPILING: Final = (
@@ -89,7 +91,8 @@ def command(arguments: Sequence[str], adapt: Callable[[RobotParts], Adapted] = a
         warm_up(lambda ready, of: process.note(_COMPILING.format(ready, of)), parts.kernels)
         beside.wait()
         if recording is not None:
-            recording.begin(robot_header(settings, epoch, clock_domain()) | {"notes": parts.notes})
+            also = {"kernels": kernel_digests(), "notes": parts.notes}
+            recording.begin(provenance(settings, epoch, clock_domain()) | also)
         model = PerceivedModel(parts.scene) if parts.any_objects else SceneModel(parts.scene)
         eyes = (first_person_eye(parts.scene), overview_eye(parts.scene)) if settings.cameras.on else (None, None)
         view = SceneView(model, parts.kinematics, parts.explains, parts.surroundings, *eyes)

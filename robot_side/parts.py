@@ -13,7 +13,7 @@ from common.roles import Role
 from common.timing.ages import LoopAge
 from robot_side.arm.following import Following
 from robot_side.compiled.kernel import Compiled, imported_kernels
-from robot_side.core import RobotParts
+from robot_side.core.robot_parts import RobotParts
 from robot_side.drivers.mujoco.arm import MujocoArm, stand
 from robot_side.drivers.mujoco.camera import CameraError, MujocoCamera
 from robot_side.drivers.mujoco.checks.cost import cost_findings
@@ -24,14 +24,14 @@ from robot_side.drivers.mujoco.checks.site_axis import site_findings
 from robot_side.drivers.mujoco.checks.start_collision import start_collision
 from robot_side.drivers.mujoco.encoders import Encoder
 from robot_side.drivers.mujoco.gripper_measurement import GripperTravel
-from robot_side.drivers.mujoco.ground_truth import GroundTruth
 from robot_side.drivers.mujoco.hand.gripper_cover import GripperCover
 from robot_side.drivers.mujoco.joint_reference import MotionLimits
 from robot_side.drivers.mujoco.kinematics import MujocoKinematics
 from robot_side.drivers.mujoco.model_enums import JointKind
 from robot_side.drivers.mujoco.robot_model import joint_names
 from robot_side.drivers.mujoco.scene import Scene, load_scene
-from robot_side.drivers.mujoco.true_contact import TrueContact
+from robot_side.drivers.mujoco.simulation_observer import SimulationObserver
+from robot_side.drivers.mujoco.viewpoints import stick_frames
 from robot_side.drivers.remote.arm import RemoteArm
 from robot_side.drivers.remote.connected_drivers import ConnectedDrivers
 from robot_side.drivers.remote.driver_session import ArmShape
@@ -44,33 +44,13 @@ from robot_side.operators.episodes import Episodes
 from robot_side.operators.operator_session import OperatorSession
 from robot_side.operators.safety import Safety
 from robot_side.operators.tuning import Tuning
-from robot_side.outcome.figures import RunFigures
 from robot_side.settings import RobotSettings
 from robot_side.surroundings.perceived import KINDS, PerceivedObjects
 from robot_side.surroundings.surroundings import Surroundings
 from robot_side.tick.explained import Explains
-from robot_side.viewing.viewpoints import stick_frames
 
 _NAMED_OBJECTS = 8
 """Maximum number of objects that a note names"""
-
-
-class SimulationObserver:
-    """Observer of the simulation's ground truth, which the pipeline itself never uses."""
-
-    def __init__(self, scene: Scene) -> None:
-        self._truth = GroundTruth(scene)
-        self._contact = TrueContact(scene, supports=False)
-        self._roles = scene.roles
-
-    def observe(self, figures: RunFigures, now_s: float) -> None:
-        """Report the true distances and contacts to `figures`."""
-        figures.truth(self._truth.observe(), self._roles, now_s)
-
-    def watch(self, figures: RunFigures, now_s: float) -> None:
-        """Report the gripper's first contact to `figures`; before it nothing can be held."""
-        if not figures.touched and (onset := self._contact.update(None)) is not None:
-            figures.first_contact(onset.thing, onset.closing_speed_m_s, now_s)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -9,7 +9,7 @@ from common.command.live_view import SLOW
 from common.loop.loop import Loop
 from common.statistics import RunningStatistics, microseconds
 from robot_side.arm.port import Arm
-from robot_side.events import Listener, Step
+from robot_side.tick.events import Listener, Step
 
 _LATEST: Final = 1000
 

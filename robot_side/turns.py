@@ -11,7 +11,7 @@ from common.protocol.view_messages import VIEW_NAMES
 from common.sockets.admission import Admission
 from common.sockets.robot import RobotSockets
 from common.status.statuses import RobotStatus
-from robot_side.core import RobotSide
+from robot_side.core.robot_side import RobotSide
 from robot_side.drivers.remote.connected_drivers import ConnectedDrivers
 from robot_side.reporting.link_reporter import LinkReporter
 from robot_side.reporting.sending import Sending
@@ -49,7 +49,7 @@ class RobotTurns:
         self._admission = Admission()
         self._sending = Sending(settings.link_spec(), sockets, secrets.randbits(32))
         always = () if process.recording is None else (*VIEW_NAMES, "scene")
-        self._looking = ViewScheduler(core, view, cameras, self._sending, always=always, seed=settings.seed)
+        self._looking = ViewScheduler(core.session, view, cameras, self._sending, always=always, seed=settings.seed)
         self._reporter = LinkReporter(
             core.session, self._sending.budget, lambda: self._looking.pictures, sockets.tcp_figures
         )
@@ -92,7 +92,7 @@ class RobotTurns:
     def rest(self, now_s: float, turned_s: float) -> None:
         """Do what may wait: views, recording, reports, keys, tuning."""
         process = self._process
-        seen = self._core.observe(turned_s) + self._looking.idle(now_s, turned_s)
+        seen = self._core.observe(turned_s) + self._looking.idle(now_s, turned_s, self._core.newest)
         self._sending.push(seen, now_s)
         if process.recording is not None:
             for message in seen:

@@ -22,11 +22,11 @@ from robot_side.drivers.mujoco.ground_truth import GroundTruth
 from robot_side.drivers.mujoco.robot_model import SiteAxis
 from robot_side.drivers.mujoco.scene import load_scene
 from robot_side.drivers.mujoco.true_contact import TrueContact
-from robot_side.events import Listener
 from robot_side.laws.law import Law
 from robot_side.main import TICK_PERIOD_S
 from robot_side.outcome.placing import Placing
 from robot_side.settings import CameraSettings, RobotSettings
+from robot_side.tick.events import Listener
 from robot_side.tick.sensed import Sensed
 from robot_side.tick.situation import Situation
 

@@ -25,13 +25,14 @@ from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.people.simulated_hands import simulated_hands
 from operator_side.settings import OperatorSettings
 from operator_side.viewing.pages.driving_page import DrivingPage
-from robot_side import events as robot_events
 from robot_side.compiled.warm_up import warm_up
-from robot_side.core import RobotParts, RobotSide
+from robot_side.core.robot_parts import RobotParts
+from robot_side.core.robot_side import RobotSide
 from robot_side.drivers.mujoco.scene import Scene
 from robot_side.main import TICK_PERIOD_S
 from robot_side.parts import SceneParts, build_parts
 from robot_side.settings import RobotSettings
+from robot_side.tick import events as robot_events
 
 _WALL = MonotonicClock()
 """Real clock, only to measure how long ticks take."""

@@ -13,7 +13,7 @@ from common.roles import Role
 from feelahead.recordings.comparison import Comparison, differing_origin, recorded_entries, require_side
 from robot_side.arm.port import Arm, ArmState
 from robot_side.compiled.warm_up import import_kernels, kernel_digests, warm_up
-from robot_side.core import RobotSide
+from robot_side.core.robot_side import RobotSide
 from robot_side.parts import build_parts
 from robot_side.recording.arm_states import unpack_state
 from robot_side.recording.frames import FrameUnpacker

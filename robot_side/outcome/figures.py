@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
@@ -10,8 +11,8 @@ from common.arrays import FloatArray
 from common.episode import EpisodeMark
 from common.roles import Role
 from common.statistics import BLOCK, RunningStatistics
-from robot_side.events import Listener, Tick
 from robot_side.outcome.placing import Placing, scaled
+from robot_side.tick.events import Listener, Tick
 from robot_side.tick.sensed import (
     ENLARGEMENT,
     L2,
@@ -26,7 +27,7 @@ from robot_side.tick.sensed import (
 )
 
 if TYPE_CHECKING:
-    from robot_side.outcome.truth import Truth
+    from robot_side.tick.truth import ContactOnset, Truth
 
 TRUTH_PERIOD_S = 0.01
 MOVING_M_S = 0.01
@@ -93,10 +94,11 @@ class RunFigures(Listener):
         if len(self._rows) >= BLOCK:
             self._take_in()
         if self._observer is not None:
-            self._observer.watch(self, now_s)
+            if not self.touched and (onset := self._observer.contact()) is not None:
+                self.first_contact(onset, now_s)
             if now_s >= self._next_truth_s:
                 self._next_truth_s = now_s + TRUTH_PERIOD_S
-                self._observer.observe(self, now_s)
+                self.truth(self._observer.observe(), self._observer.roles, now_s)
 
     def since_start_s(self, time_s: float) -> float:
         """Return the time since the first tick."""
@@ -107,7 +109,7 @@ class RunFigures(Listener):
         for tick in self._unread:
             if (found := tick.found) is None:
                 continue
-            armed = found.permission.state == "armed"
+            armed = found.motion_state == "armed"
             if found.situation.loop_age_known:
                 self._loop_age.add(found.situation.loop_age_s)
             self.tick(found.sensed, armed=armed, settled=found.situation.loop_age_settled)
@@ -138,7 +140,7 @@ class RunFigures(Listener):
         self._l2.extend((armed * numbers[:, _L2_STIFFNESS]).tolist())
         self._r2.extend((armed * numbers[:, _R2_STIFFNESS]).tolist())
 
-    def truth(self, truth: Truth, roles: dict[str, Role], now_s: float) -> None:
+    def truth(self, truth: Truth, roles: Mapping[str, Role], now_s: float) -> None:
         """Add true distances and contacts from the simulation; count the contacts that begin."""
         self._knows_truth = True
         self._min_distance_m = _smaller(self._min_distance_m, truth.min_distance_m)
@@ -157,10 +159,10 @@ class RunFigures(Listener):
         """Whether there has been a contact with an object that is no support"""
         return self._first_contact is not None
 
-    def first_contact(self, thing: str, closing_speed_m_s: float, now_s: float) -> None:
+    def first_contact(self, onset: ContactOnset, now_s: float) -> None:
         """Store the gripper's first contact with an object that is no support."""
-        speed_mm_s = 1e3 * closing_speed_m_s
-        self._first_contact = {"with": thing, "speed_mm_s": speed_mm_s, "time_s": self.since_start_s(now_s)}
+        speed_mm_s = 1e3 * onset.closing_speed_m_s
+        self._first_contact = {"with": onset.thing, "speed_mm_s": speed_mm_s, "time_s": self.since_start_s(now_s)}
 
     def task(self, armed: bool, held: bool, target_center_m: FloatArray | None, now_s: float) -> None:
         """Update the task's progress: armed, grasped, lifted. target_center_m: (3,) as perceived."""
@@ -212,14 +214,19 @@ class RunFigures(Listener):
 
 
 class Observer(Protocol):
-    """Observer of the truth in a simulation."""
+    """Port of a simulation that tells the truth."""
 
-    def observe(self, figures: RunFigures, now_s: float) -> None:
-        """Report the true distances and contacts to `figures`."""
+    @property
+    def roles(self) -> Mapping[str, Role]:
+        """Roles of the objects, by name"""
         ...
 
-    def watch(self, figures: RunFigures, now_s: float) -> None:
-        """Report the first contact to `figures`; called in every turn."""
+    def observe(self) -> Truth:
+        """Return the true distances and contacts."""
+        ...
+
+    def contact(self) -> ContactOnset | None:
+        """Return a contact that has begun with an object that is no support; called each turn, until the first."""
         ...
 
 

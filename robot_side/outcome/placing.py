@@ -10,7 +10,7 @@ import numpy as np
 from common.arrays import FloatArray
 
 if TYPE_CHECKING:
-    from robot_side.outcome.truth import TargetTruth
+    from robot_side.tick.truth import TargetTruth
 
 LIFTED_M: Final = 0.01
 """Distance from every support, in m, at which the target counts as lifted."""

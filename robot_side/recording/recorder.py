@@ -11,14 +11,11 @@ import msgspec
 
 from common.episode import EpisodeMark
 from common.recording.entries import Kind, entry, text
-from common.recording.provenance import provenance
 from robot_side.arm.port import ArmState
-from robot_side.compiled.warm_up import kernel_digests
-from robot_side.events import Listener, Tick
 from robot_side.recording.arm_states import pack_state
 from robot_side.recording.frames import FramePacker
-from robot_side.settings import RobotSettings
 from robot_side.surroundings.perceived import PerceivedObjects
+from robot_side.tick.events import Listener, Tick
 
 _HAPTICS: Final = b"haptics"
 
@@ -74,8 +71,3 @@ class RobotEncoder:
         for message in outgoing:
             parts.append(entry(Kind.SENT, now_s, text(_HAPTICS), text(message.peer), message.payload))
         return now_s, b"".join(parts)
-
-
-def robot_header(settings: RobotSettings, epoch: int, clock_domain: str) -> dict[str, Any]:
-    """Return the core's provenance for the recording's header; to be called after the kernels are compiled."""
-    return provenance(settings, epoch, clock_domain) | {"kernels": kernel_digests()}

@@ -9,7 +9,7 @@ from common.protocol.messages import LinkReport
 from common.rate.budget import Budget
 from common.sockets.tcp_figures import TcpFigures
 from robot_side.operators.operator_session import OperatorSession
-from robot_side.reporting.outgoing_messages import Outgoing, OutgoingStream
+from robot_side.tick.outgoing import Outgoing, OutgoingStream
 
 PERIOD_S: Final = 0.5
 _NAMES: Final = {"video": "pictures"}

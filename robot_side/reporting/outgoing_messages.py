@@ -1,7 +1,8 @@
 """Messages of the robot side: stiffness for operators, and telemetry for viewers."""
 
 import math
-from typing import Final, Literal, NamedTuple
+from collections.abc import Callable
+from typing import Final
 
 import numpy as np
 
@@ -9,20 +10,13 @@ from common.arrays import FloatArray
 from common.protocol.around import Around
 from common.protocol.codec import encode
 from common.protocol.messages import Header, MotionState, StiffnessUpdate, Telemetry
-from common.protocol.view_messages import SCENE_TOPIC, VIDEO_TOPIC
 from robot_side.arm.hindrance import Hindrance
 from robot_side.arm.port import ArmState, GripperPose
 from robot_side.arm.stick_frames import StickFrames
-from robot_side.laws.law import Law
 from robot_side.operators.operator_session import Receiver
+from robot_side.tick.outgoing import SHOWN_NAME, Outgoing
 from robot_side.tick.sensed import L2, R2, Sensed
 
-OutgoingStream = Literal["haptics", "telemetry", "video", "scene"]
-TOPICS: Final[dict[OutgoingStream, bytes]] = {"telemetry": b"telemetry", "video": VIDEO_TOPIC, "scene": SCENE_TOPIC}
-"""Topics of the streams to viewers. The scene has its own stream, because its large messages would delay telemetry."""
-
-SHOWN_NAME = 100
-"""Number of characters to which an object's name is cut before it is sent or shown, as messages have a limited size"""
 _AROUND_S: Final = 0.1
 _AROUND_AGAIN_S: Final = 0.4
 """Seconds after which an unchanged map is sent again, so that a lost one is replaced"""
@@ -31,29 +25,20 @@ _FASTEST_M_S, _LARGEST_M = 100.0, 100.0
 """Limits of sent values: even a simulation that is about to become unstable must be able to report its figures."""
 
 
-class Outgoing(NamedTuple):
-    """Payload to send: of haptics to `peer` at the control port, of other streams to all viewers."""
-
-    stream: OutgoingStream
-    peer: bytes
-    payload: bytes
-    everywhere: bool = False
-    """Whether to send over every connection of `peer`, because the message must arrive soon; else over the next one in
-    turn"""
-
-
 class MapSchedule:
     """Schedule of maps in stiffness messages: ten a second while the map changes, otherwise one every 0.4 s."""
 
-    def __init__(self) -> None:
+    def __init__(self, around: Callable[[GripperPose], Around | None]) -> None:
+        """around: returns the map around a pose (`Law.around`)."""
+        self._around = around
         self._sent: Around | None = None
         self._sent_s = self._looked_s = -math.inf
 
-    def due(self, law: Law, pose: GripperPose, now_s: float) -> Around | None:
+    def due(self, pose: GripperPose, now_s: float) -> Around | None:
         """Return the map (`Around`) if it is due, else None."""
         if now_s - self._looked_s < _AROUND_S:
             return None
-        self._looked_s, around = now_s, law.around(pose)
+        self._looked_s, around = now_s, self._around(pose)
         known = self._sent is not None and around is not None and not around.differs(self._sent)
         if around is None or (known and now_s - self._sent_s < _AROUND_AGAIN_S):
             return None

@@ -1,22 +1,23 @@
 """Messages of one tick: answers and stiffness for operators; and telemetry for viewers, after these have left."""
 
+from collections.abc import Callable
 from typing import Final
 
 import msgspec
 import numpy as np
 
 from common.arrays import FloatArray
+from common.protocol.around import Around
 from common.protocol.codec import encode
 from common.protocol.messages import MotionState
 from robot_side.arm.hindrance import Hindrance
-from robot_side.arm.port import ArmState
+from robot_side.arm.port import ArmState, GripperPose
 from robot_side.arm.stick_frames import StickFrames
-from robot_side.laws.law import Law
-from robot_side.motion import Motion
 from robot_side.operators.operator_session import OperatorSession
 from robot_side.operators.safety import Permission
-from robot_side.reporting.outgoing_messages import MapSchedule, Outgoing, stiffness_message, telemetry
+from robot_side.reporting.outgoing_messages import MapSchedule, stiffness_message, telemetry
 from robot_side.reporting.perceptual_deadband import StiffnessDeadband, TelemetryDeadband
+from robot_side.tick.outgoing import Outgoing
 from robot_side.tick.sensed import Sensed
 from robot_side.tick.situation import Situation
 
@@ -28,37 +29,43 @@ class Reports:
     """Choice of the messages that are due in a tick, by deadbands and schedules."""
 
     def __init__(
-        self, session: OperatorSession, law: Law, frames: StickFrames | None = None, *, full_rate: bool = False
+        self,
+        session: OperatorSession,
+        around: Callable[[GripperPose], Around | None],
+        frames: StickFrames | None = None,
+        *,
+        full_rate: bool = False,
     ) -> None:
-        """full_rate: send a stiffness message in every tick."""
+        """around: `Law.around`. full_rate: send a stiffness message in every tick."""
         self.stiffness_sent = 0
         self.felt = StiffnessDeadband(full_rate=full_rate)
         """Deadband that decides when a stiffness message to the lease's owner leaves"""
-        self._session, self._law, self._frames = session, law, frames
-        self._around, self._seen = MapSchedule(), TelemetryDeadband()
+        self._session, self._law_around, self._frames = session, around, frames
+        self._around, self._seen = MapSchedule(around), TelemetryDeadband()
         self._next_observers_s = -np.inf
 
     def begin_epoch(self) -> None:
         """Begin with another owner of the lease, to which nothing has been sent yet."""
         self.felt.forget()
-        self._around = MapSchedule()
+        self._around = MapSchedule(self._law_around)
 
     def outgoing(
         self,
         permission: Permission,
         situation: Situation,
         sensed: Sensed,
-        motion: Motion,
+        told_m_s: float,
         stands: bool,
+        hindered: bool,
         now_s: float,
     ) -> list[Outgoing]:
-        """Return the messages to operators that are due at `now_s`. stands: whether the held object is supported."""
+        """Return the messages to operators that are due at `now_s`; see `stiffness_message`."""
         session = self._session
-        felt = sensed, motion.told_m_s, permission.state, stands, motion.hindrance.text is not None
+        felt = sensed, told_m_s, permission.state, stands, hindered
         outgoing = [Outgoing("haptics", *answer) for answer in session.take_answers(now_s)]
         if session.owner_peer is not None and self.felt.due(*felt, permission.command, now_s):
             self.stiffness_sent += 1
-            around = self._around.due(self._law, situation.pose, now_s)
+            around = self._around.due(situation.pose, now_s)
             outgoing += [stiffness_message(one, *felt, around) for one in session.owners(now_s)]
         if now_s >= self._next_observers_s:
             self._next_observers_s = now_s + OBSERVER_PERIOD_S

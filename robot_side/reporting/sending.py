@@ -6,12 +6,14 @@ from typing import Any, Final, NamedTuple, Protocol
 from common.emulation.delay_line import BitFlip, DelayLine, link_summary
 from common.emulation.spec import LinkSpec, Stream
 from common.emulation.tuned import tuned_link
+from common.protocol.view_messages import SCENE_TOPIC, VIDEO_TOPIC
 from common.rate.budget import Budget
 from common.rate.outgoing_queue import OutgoingQueue
 from common.rate.pieces import PIECE
-from robot_side.reporting.outgoing_messages import TOPICS, Outgoing, OutgoingStream
+from robot_side.tick.outgoing import SENT_STREAMS, Outgoing, OutgoingStream
 
-SENT_STREAMS: Final[tuple[Stream, ...]] = ("haptics", "telemetry", "video", "scene")
+TOPICS: Final[dict[OutgoingStream, bytes]] = {"telemetry": b"telemetry", "video": VIDEO_TOPIC, "scene": SCENE_TOPIC}
+"""Topics of the streams to viewers. The scene has its own stream, because its large messages would delay telemetry."""
 _PACED: Final[tuple[OutgoingStream, ...]] = ("video", "scene")
 
 

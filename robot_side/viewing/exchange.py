@@ -9,22 +9,7 @@ from typing import Final
 import msgspec
 
 from common.protocol.view_messages import ViewName
-
-Triple = tuple[float, float, float]
-
-
-class Viewpoint(msgspec.Struct, frozen=True):
-    """Viewpoint of a view: a camera of the model; without one, a pose in the frame of a body."""
-
-    camera: int | None = None
-    body: int = 0
-    position_m: Triple = (0.0, 0.0, 0.0)
-    forward: Triple = (1.0, 0.0, 0.0)
-    """Unit vector"""
-    up: Triple = (0.0, 0.0, 1.0)
-    """Unit vector, orthogonal to `forward`"""
-    fovy_deg: float = 45.0
-    """Vertical field of view: angle from the picture's lower edge to its upper edge"""
+from robot_side.drivers.mujoco.viewpoints import Viewpoint
 
 
 class Setup(msgspec.Struct, frozen=True, tag=True):

@@ -13,10 +13,10 @@ from common.companion.process import Companion
 from common.protocol.messages import Header
 from common.protocol.view_messages import VIEW_NAMES, VideoFrame, VideoStep, ViewName
 from robot_side.drivers.mujoco.scene import Scene
+from robot_side.drivers.mujoco.viewpoints import viewpoints
 from robot_side.viewing.exchange import Order, Picture, Ready, Refusal, Setup, decode_from_companion, encode
 from robot_side.viewing.picture_rate_control import PictureRateControl, Step
 from robot_side.viewing.settings import CamerasSettings
-from robot_side.viewing.viewpoints import viewpoints
 
 MODULE: Final = "robot_side.viewing.companion"
 IDLE_S: Final = 60.0

@@ -6,7 +6,8 @@ import numpy.typing as npt
 
 from common.arrays import FloatArray
 from common.protocol.view_messages import ViewName
-from robot_side.viewing.exchange import Setup, Viewpoint
+from robot_side.drivers.mujoco.viewpoints import Viewpoint
+from robot_side.viewing.exchange import Setup
 
 _MODEL = "model.mjb"
 _BESIDE_GEOMS = 1000

@@ -13,11 +13,11 @@ from common.protocol.messages import Header
 from common.protocol.view_messages import Eye, Near, SceneShapes, SceneState, Shape
 from common.roles import ROLES, Role
 from robot_side.drivers.mujoco.kinematics import MujocoKinematics
-from robot_side.gripper.perceived_distances import perceived_distances
-from robot_side.reporting.outgoing_messages import SHOWN_NAME
 from robot_side.surroundings.perceived import PerceivedObjects
+from robot_side.surroundings.perceived_distances import perceived_distances
 from robot_side.surroundings.surroundings import Surroundings
 from robot_side.tick.explained import Explains, Trigger, TriggerExplained
+from robot_side.tick.outgoing import SHOWN_NAME
 from robot_side.tick.sensed import Sensed
 from robot_side.tick.situation import Situation
 from robot_side.viewing.shapes import SceneModel, bytes_of
@@ -153,7 +153,8 @@ class SceneView:
     def _near(self, situation: Situation) -> Near:
         objects, held = situation.objects, situation.held
         target = objects.roles.index(Role.TARGET) if Role.TARGET in objects.roles else None
-        apart = perceived_distances(situation.pose, self._surroundings.see(objects), target, held)
+        spheres = situation.pose.sphere_centers_m, situation.pose.sphere_radii_m
+        apart = perceived_distances(*spheres, self._surroundings.see(objects), target, held)
         names = apart.nearest, None if held is None else objects.names[held]
         nearest, holding = (None if name is None else name[:SHOWN_NAME] for name in names)
         return Near(nearest, apart.nearest_m, apart.target_m, holding)

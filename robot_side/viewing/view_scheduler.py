@@ -8,8 +8,10 @@ from typing import Any, Final, Protocol
 from common.protocol.codec import VIEW_MAXIMUM_BYTES, encode
 from common.protocol.view_messages import VIEW_NAMES, ViewName
 from common.statistics import RunningStatistics
-from robot_side.core import RobotSide
-from robot_side.reporting.outgoing_messages import Outgoing, OutgoingStream
+from robot_side.operators.operator_session import OperatorSession
+from robot_side.tick.outgoing import Outgoing, OutgoingStream
+from robot_side.tick.sensed import Sensed
+from robot_side.tick.situation import Situation
 from robot_side.viewing.pictures import Cameras
 from robot_side.viewing.scene_view import SceneView, TickFigures
 
@@ -47,7 +49,7 @@ class ViewScheduler:
 
     def __init__(
         self,
-        core: RobotSide,
+        session: OperatorSession,
         scene_view: SceneView,
         cameras: Cameras | None,
         room: Room,
@@ -56,7 +58,7 @@ class ViewScheduler:
         seed: int = 0,
     ) -> None:
         """always: which of `overview`, `first_person` and `scene` are made even if unwatched, for the recording."""
-        self._core = core
+        self._session = session
         self._scene_view = scene_view
         self._cameras = cameras
         self._room = room
@@ -77,9 +79,12 @@ class ViewScheduler:
         self._ticks_s.append(took_s)
         self._ticks.overruns = overruns
 
-    def idle(self, now_s: float, taken_s: float) -> list[Outgoing]:
-        """Return the messages with views to send now. taken_s: time of the newest tick, whose state they show."""
-        looked_at = self._core.session.watchers.looked_at(now_s) | self._always
+    def idle(self, now_s: float, taken_s: float, newest: tuple[Sensed, Situation] | None) -> list[Outgoing]:
+        """Return the messages with views to send now.
+
+        newest: the law's result and situation in the newest tick, at `taken_s`, which the views show.
+        """
+        looked_at = self._session.watchers.looked_at(now_s) | self._always
         if not looked_at and now_s < self._next_look_s:
             return []
         self._next_look_s = now_s + _SEEN_TO_S
@@ -91,8 +96,8 @@ class ViewScheduler:
             elif turns:
                 due.add(name)
         outgoing = self._pictures(now_s, taken_s, due, looked_at)
-        if "scene" in looked_at:
-            outgoing += self._scene(now_s, taken_s, is_due="scene" in due)
+        if "scene" in looked_at and newest is not None:
+            outgoing += self._scene(now_s, taken_s, newest, is_due="scene" in due)
         return outgoing
 
     def summary(self) -> dict[str, Any]:
@@ -138,7 +143,7 @@ class ViewScheduler:
             return []
         views = len(looked_at & set(VIEW_NAMES))
         # Recorded pictures are JPEG: replay and export begin anywhere.
-        lacks = None if self._always else self._core.session.watchers.lacks(now_s)
+        lacks = None if self._always else self._session.watchers.lacks(now_s)
         h264 = cameras.makes_h264(lacks)
         cameras.picture_rate_control.update(self._room.left_bit_s, views, now_s, eager=self._room.begins, h264=h264)
         wanted: list[ViewName] = []
@@ -154,19 +159,16 @@ class ViewScheduler:
                     self._late.discard(name)
                     wanted.append(name)
         outgoing = []
-        expected = self._core.session.watchers.expected(now_s)
+        expected = self._session.watchers.expected(now_s)
         for picture in cameras.update(now_s, taken_s, wanted, lacks, expected=expected):
             self._counts[picture.view]["sent"] += 1
             self._frame_age.add(now_s - picture.captured_s)
-            frame = cameras.message(picture, self._core.session.shown_header(now_s))
+            frame = cameras.message(picture, self._session.shown_header(now_s))
             outgoing.append(Outgoing("video", b"", encode(frame)))
         return outgoing
 
-    def _scene(self, now_s: float, taken_s: float, *, is_due: bool) -> list[Outgoing]:
-        newest, view, session = self._core.newest, self._scene_view, self._core.session
-        if newest is None:
-            return []
-        sensed, situation = newest
+    def _scene(self, now_s: float, taken_s: float, newest: tuple[Sensed, Situation], *, is_due: bool) -> list[Outgoing]:
+        view, session, (sensed, situation) = self._scene_view, self._session, newest
         others = view.outdated(situation.objects)
         if self._begun != session.watchers.scene_begun or others:
             self._begun = session.watchers.scene_begun

@@ -34,7 +34,11 @@ ARROWS = """
 
     robot_side/compiled: common common/companion common/files
     robot_side/overlap/checks: common
+    robot_side/operators: common common/emulation common/protocol
+    robot_side/tick/truth.py: common
     robot_side/overlap/digits: common robot_side/compiled
+    robot_side/arm: common common/protocol robot_side/compiled
+    robot_side/enlargement: common common/protocol robot_side/compiled
     robot_side/overlap/closed_forms: common robot_side/compiled robot_side/overlap/digits
     robot_side/overlap/lanes: common robot_side/compiled robot_side/overlap/checks robot_side/overlap/closed_forms
         robot_side/overlap/digits
@@ -43,50 +47,41 @@ ARROWS = """
         robot_side/overlap/digits
     robot_side/overlap: common robot_side/compiled robot_side/overlap/checks robot_side/overlap/closed_forms
         robot_side/overlap/lanes robot_side/overlap/meshes robot_side/overlap/precise
-    robot_side/operators: common common/emulation common/protocol
-    robot_side/arm: common common/protocol robot_side/compiled
-    robot_side/enlargement: common common/protocol robot_side/compiled
     robot_side/surroundings/kinds: common robot_side/compiled robot_side/overlap/closed_forms robot_side/overlap/lanes
         robot_side/overlap/meshes
     robot_side/surroundings: common robot_side/compiled robot_side/overlap/meshes robot_side/surroundings/kinds
-    robot_side/tick: common common/protocol robot_side/arm robot_side/surroundings
     robot_side/field: common robot_side/arm robot_side/compiled robot_side/enlargement robot_side/surroundings
         robot_side/surroundings/kinds
-    robot_side/laws/named.py: robot_side/laws robot_side/tick
-    robot_side/laws: common common/protocol robot_side/arm robot_side/compiled robot_side/enlargement robot_side/field
-        robot_side/surroundings robot_side/tick
     robot_side/gripper: common common/files robot_side/arm robot_side/compiled robot_side/overlap/meshes
         robot_side/surroundings
-    robot_side/outcome/truth.py: common
-    robot_side/drivers/mujoco: common common/files robot_side/arm robot_side/compiled robot_side/field
-        robot_side/gripper robot_side/outcome/truth.py robot_side/overlap/meshes robot_side/surroundings
-        robot_side/surroundings/kinds
-    robot_side/drivers/mujoco/checks: common robot_side/arm robot_side/drivers/mujoco
-    robot_side/homing.py: common common/protocol robot_side/arm robot_side/gripper robot_side/surroundings
-    robot_side/motion.py: common robot_side/arm robot_side/gripper robot_side/operators robot_side/tick
-    robot_side/reporting: common common/emulation common/protocol common/rate common/sockets robot_side/arm
-        robot_side/compiled robot_side/laws robot_side/motion.py robot_side/operators robot_side/tick
-    robot_side/events.py: common robot_side/arm robot_side/operators robot_side/reporting robot_side/surroundings
-        robot_side/tick
-    robot_side/outcome: common robot_side/events.py robot_side/outcome/truth.py robot_side/tick
-    robot_side/core.py: common common/status common/timing robot_side/arm robot_side/events.py robot_side/gripper
-        robot_side/homing.py robot_side/laws robot_side/motion.py robot_side/operators robot_side/outcome
-        robot_side/reporting robot_side/surroundings robot_side/tick
+    robot_side/tick: common common/protocol robot_side/arm robot_side/surroundings
     robot_side/drivers/remote: common common/sockets common/timing robot_side/arm robot_side/surroundings
-    robot_side/viewing: common common/companion common/protocol robot_side/arm robot_side/core.py
-        robot_side/drivers/mujoco robot_side/gripper robot_side/reporting robot_side/surroundings robot_side/tick
+    robot_side/laws: common common/protocol robot_side/arm robot_side/compiled robot_side/enlargement robot_side/field
+        robot_side/surroundings robot_side/tick
+    robot_side/drivers/mujoco: common common/files common/protocol robot_side/arm robot_side/compiled robot_side/field
+        robot_side/gripper robot_side/overlap/meshes robot_side/surroundings robot_side/surroundings/kinds
+        robot_side/tick/truth.py
+    robot_side/reporting: common common/emulation common/protocol common/rate common/sockets robot_side/arm
+        robot_side/compiled robot_side/operators robot_side/tick
+    robot_side/outcome: common robot_side/tick robot_side/tick/truth.py
+    robot_side/recording: common common/recording robot_side/arm robot_side/surroundings robot_side/tick
+    robot_side/laws/named.py: robot_side/laws robot_side/tick
+    robot_side/drivers/mujoco/checks: common robot_side/arm robot_side/drivers/mujoco
+    robot_side/core: common common/protocol common/status common/timing robot_side/arm robot_side/gripper
+        robot_side/laws robot_side/operators robot_side/outcome robot_side/reporting robot_side/surroundings
+        robot_side/tick
+    robot_side/viewing: common common/companion common/protocol robot_side/drivers/mujoco robot_side/operators
+        robot_side/surroundings robot_side/tick
     robot_side/settings.py: common common/command robot_side/arm robot_side/drivers/mujoco robot_side/enlargement
         robot_side/laws/named.py robot_side/operators robot_side/viewing
-    robot_side/recording: common common/recording robot_side/arm robot_side/compiled robot_side/events.py
-        robot_side/settings.py robot_side/surroundings
-    robot_side/parts.py: common common/protocol common/timing robot_side/arm robot_side/compiled robot_side/core.py
+    robot_side/parts.py: common common/protocol common/timing robot_side/arm robot_side/compiled robot_side/core
         robot_side/drivers/mujoco robot_side/drivers/mujoco/checks robot_side/drivers/remote robot_side/enlargement
-        robot_side/gripper robot_side/laws/named.py robot_side/operators robot_side/outcome robot_side/settings.py
-        robot_side/surroundings robot_side/tick robot_side/viewing
-    robot_side: common common/command common/emulation common/loop common/protocol common/realtime common/sockets
-        common/status robot_side/arm robot_side/compiled robot_side/core.py robot_side/drivers/remote
-        robot_side/events.py robot_side/parts.py robot_side/recording robot_side/reporting robot_side/settings.py
-        robot_side/viewing
+        robot_side/gripper robot_side/laws/named.py robot_side/operators robot_side/settings.py
+        robot_side/surroundings robot_side/tick
+    robot_side: common common/command common/emulation common/loop common/protocol common/realtime common/recording
+        common/sockets common/status robot_side/arm robot_side/compiled robot_side/core robot_side/drivers/mujoco
+        robot_side/drivers/remote robot_side/parts.py robot_side/recording robot_side/reporting robot_side/settings.py
+        robot_side/tick robot_side/viewing
 
     operator_side/controller: common common/status
     operator_side/dualsense/effects: operator_side/controller
@@ -132,8 +127,8 @@ ARROWS = """
     feelahead/printing: common
     feelahead/lab: common/* robot_side/* operator_side/* feelahead/both_sides feelahead/containers feelahead/printing
     feelahead/commands/bench_and_try.py: common feelahead/lab
-    feelahead/commands: common/* robot_side/compiled robot_side/laws/named.py robot_side/viewing operator_side/*
-        feelahead/both_sides feelahead/printing feelahead/recordings
+    feelahead/commands: common/* robot_side/compiled robot_side/drivers/mujoco robot_side/laws/named.py
+        robot_side/viewing operator_side/* feelahead/both_sides feelahead/printing feelahead/recordings
     feelahead: common/*
 """
 """One row for each room: the room, and the rooms that it may import.

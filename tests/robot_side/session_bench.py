@@ -22,11 +22,12 @@ from common.protocol.messages import (
 )
 from common.protocol.session import SessionState
 from robot_side.arm.port import ArmState
-from robot_side.core import RobotParts, RobotSide
-from robot_side.events import Listener, Tick
+from robot_side.core.robot_parts import RobotParts
+from robot_side.core.robot_side import RobotSide
 from robot_side.operators.safety import SafetySettings
 from robot_side.parts import build_parts
 from robot_side.settings import RobotSettings
+from robot_side.tick.events import Listener, Tick
 
 TICK_S = 0.001
 COMMAND_PERIOD_TICKS = 4

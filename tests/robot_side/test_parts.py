@@ -10,7 +10,7 @@ import pytest
 
 from common.errors import ConfigurationError
 from common.roles import Role
-from robot_side.core import RobotSide
+from robot_side.core.robot_side import RobotSide
 from robot_side.enlargement.distance import Uncertainty
 from robot_side.enlargement.prediction_errors import BUILT_IN, load_prediction_errors
 from robot_side.laws.paper import PaperLaw
@@ -184,7 +184,7 @@ def test_a_scene_needs_no_kernels_for_primitives_that_it_lacks(
 def test_a_scene_without_meshes_loads_no_kernel_for_them_and_none_of_the_librarys() -> None:
     program = (
         "import feelahead.both_sides.loopback, robot_side.main\n"
-        "from robot_side.core import RobotSide\n"
+        "from robot_side.core.robot_side import RobotSide\n"
         "from robot_side.parts import build_parts\n"
         "from robot_side.compiled.kernel import imported_kernels\n"
         "from robot_side.settings import RobotSettings\n"

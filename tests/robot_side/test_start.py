@@ -16,7 +16,7 @@ pytestmark = pytest.mark.processes
 LATE = """
 import sys
 from robot_side import main
-from robot_side.events import Listener
+from robot_side.tick.events import Listener
 class Late(Listener):
     def on_tick(self, tick):
         from robot_side.overlap import sphere_sphere

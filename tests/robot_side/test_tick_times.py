@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from common.statistics import microseconds
-from robot_side.core import RobotSide
+from robot_side.core.robot_side import RobotSide
 from robot_side.parts import build_parts
 from robot_side.settings import RobotSettings
 from robot_side.tick_times import PhysicsTime

@@ -11,13 +11,12 @@ import numpy as np
 from common.companion.process import Companion
 from feelahead.both_sides.grasping_trial import LOOK_S, R2, Trial, Watch, run_trial
 from operator_side.controller.feel import MAX_STRENGTH
+from robot_side.drivers.mujoco.viewpoints import Triple, Viewpoint
 from robot_side.viewing.exchange import (
     Order,
     Picture,
     Refusal,
     Setup,
-    Triple,
-    Viewpoint,
     decode_from_companion,
     encode,
 )

@@ -24,9 +24,10 @@ from operator_side.settings import OperatorSettings
 from robot_side.compiled.warm_up import import_kernels, warm_up
 from robot_side.drivers.mujoco.robot_model import SiteAxis
 from robot_side.drivers.mujoco.scene import load_scene
-from robot_side.drivers.mujoco.true_contact import ContactOnset, TrueContact
-from robot_side.events import Listener
+from robot_side.drivers.mujoco.true_contact import TrueContact
 from robot_side.settings import Assist, CameraSettings, RobotSettings
+from robot_side.tick.events import Listener
+from robot_side.tick.truth import ContactOnset
 
 _FULL: Final = Feel(l2=(MAX_STRENGTH,) * ZONE_COUNT, r2=(MAX_STRENGTH,) * ZONE_COUNT)
 

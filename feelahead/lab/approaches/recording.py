@@ -22,8 +22,8 @@ from operator_side.people.pulling_hands import PullingHands
 from operator_side.settings import OperatorSettings
 from robot_side.drivers.mujoco.posed_scene import disable_contacts
 from robot_side.drivers.mujoco.scene import Scene, load_scene
-from robot_side.events import Listener
 from robot_side.settings import RobotSettings
+from robot_side.tick.events import Listener
 
 POSE_S = 0.01
 """Sampling period of the true pose, in seconds."""

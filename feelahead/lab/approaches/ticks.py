@@ -11,11 +11,11 @@ from operator_side.controller.feel import MAX_STRENGTH
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.people.pulling_hands import PullingHands, constant_force
 from operator_side.settings import OperatorSettings
-from robot_side import events
 from robot_side.drivers.mujoco.scene import Scene, load_scene
-from robot_side.events import Listener
 from robot_side.laws.swept import SweptLaw
 from robot_side.settings import RobotSettings
+from robot_side.tick import events
+from robot_side.tick.events import Listener
 from robot_side.tick.situation import Situation
 
 DEMO: Final = "demo"

@@ -25,7 +25,8 @@ from operator_side.core_settings import CoreSettings
 from operator_side.robot_link.commanding import ToRobot
 from robot_side.operators.operator_session import OperatorSession
 from robot_side.operators.safety import Safety, SafetySettings
-from robot_side.reporting.outgoing_messages import Outgoing, stiffness_message
+from robot_side.reporting.outgoing_messages import stiffness_message
+from robot_side.tick.outgoing import Outgoing
 from robot_side.tick.sensed import Sensed
 
 BYTES: Final = (169, 138)

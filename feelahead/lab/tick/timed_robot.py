@@ -22,9 +22,9 @@ import robot_side.main
 from common.command.command_line import parse_settings, run_command
 from feelahead.lab.tick.crowd import CrowdedCamera
 from feelahead.lab.tick.mixed import Mixed
-from robot_side.core import RobotParts
-from robot_side.events import Listener, Step, Tick
+from robot_side.core.robot_parts import RobotParts
 from robot_side.laws.law import Law
+from robot_side.tick.events import Listener, Step, Tick
 
 PROGRAM: Final = "feelahead.lab.tick.timed_robot"
 STAGES: Final = ("physics", "look", "frame", "law", "motion", "figures", "message")

@@ -11,7 +11,7 @@ from common.arrays import FloatArray, IntArray
 from common.roles import Role
 from robot_side.drivers.mujoco.model_enums import GeomKind
 from robot_side.drivers.mujoco.scene import Scene
-from robot_side.outcome.truth import TargetTruth, Truth
+from robot_side.tick.truth import TargetTruth, Truth
 
 _FARTHEST_SUPPORT_M: Final = 1.0
 _FEW: Final = 64

@@ -1,6 +1,5 @@
 """True contacts of the gripper and a held object: onset, closing speed and free gap; only for experiments."""
 
-from dataclasses import dataclass
 from typing import Any
 
 import mujoco  # type: ignore[import-untyped]
@@ -11,22 +10,10 @@ from common.roles import Role
 from robot_side.drivers.mujoco.ground_truth import geom_distance, least_distance
 from robot_side.drivers.mujoco.model_enums import GeomKind
 from robot_side.drivers.mujoco.scene import Scene
+from robot_side.tick.truth import ContactOnset
 
 _TOUCHING_M = 1e-5
 _MOST_STEPS = 200
-
-
-@dataclass(frozen=True)
-class ContactOnset:
-    """Beginning of a contact."""
-
-    thing: str
-    """Name of the object that is touched"""
-    gripper_part: str
-    """Name of the geom, of the gripper or of the held object, that touches it"""
-    closing_speed_m_s: float
-    """Closing speed of the touching points along the contact's normal, before the physics step that
-    found the contact"""
 
 
 class TrueContact:

@@ -9,9 +9,9 @@ from common.arrays import FloatArray
 from common.episode import EpisodeMark
 from common.protocol.codec import encode
 from common.protocol.messages import Mark
-from robot_side.events import Listener
 from robot_side.parts import SceneParts, build_parts
 from robot_side.settings import RobotSettings
+from robot_side.tick.events import Listener
 from tests.robot_side.session_bench import QUICK, Bench, Operator
 
 

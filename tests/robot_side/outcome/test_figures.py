@@ -6,8 +6,8 @@ import pytest
 from common.protocol.uniform_field import uniform_field
 from common.roles import Role
 from robot_side.outcome.figures import MOVING_M_S, RunFigures
-from robot_side.outcome.truth import Truth
 from robot_side.tick.sensed import Sensed
+from robot_side.tick.truth import Truth
 
 ROLES = {"post": Role.OBSTACLE, "cup": Role.TARGET, "table": Role.SUPPORT}
 

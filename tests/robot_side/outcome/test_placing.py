@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from robot_side.outcome.placing import Placing
-from robot_side.outcome.truth import TargetTruth
+from robot_side.tick.truth import TargetTruth
 
 
 def at(gap_m: float, sinking_m_s: float = 0.0, tilt_rad: float = 0.0, x_m: float = 0.0) -> TargetTruth:

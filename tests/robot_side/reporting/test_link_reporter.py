@@ -19,7 +19,7 @@ from operator_side.robot_link.lease_state import REPORT_EXPIRES_S
 from robot_side.operators.operator_session import OperatorSession
 from robot_side.operators.safety import Safety, SafetySettings
 from robot_side.reporting.link_reporter import PERIOD_S, LinkReporter
-from robot_side.reporting.outgoing_messages import OutgoingStream
+from robot_side.tick.outgoing import OutgoingStream
 
 PICTURES = {"rate_hz": 15.0, "quality": 60, "size": 0.5}
 

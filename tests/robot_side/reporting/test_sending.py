@@ -3,8 +3,8 @@
 from common.emulation.spec import LinkSpec
 from common.rate.outgoing_queue import OutgoingQueue
 from common.rate.pieces import PIECE, Joining
-from robot_side.reporting.outgoing_messages import Outgoing
 from robot_side.reporting.sending import Sending
+from robot_side.tick.outgoing import Outgoing
 
 PICTURE = bytes(range(256)) * 60
 

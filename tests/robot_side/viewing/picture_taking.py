@@ -14,19 +14,18 @@ from common.arrays import FloatArray
 from common.companion.process import Companion
 from common.protocol.view_messages import ViewName
 from robot_side.drivers.mujoco.scene import Scene
+from robot_side.drivers.mujoco.viewpoints import Viewpoint, viewpoints
 from robot_side.viewing.exchange import (
     Order,
     Picture,
     Ready,
     Refusal,
     Setup,
-    Viewpoint,
     decode_from_companion,
     encode,
 )
 from robot_side.viewing.pictures import MODULE, saved_model
 from robot_side.viewing.rendering import placed
-from robot_side.viewing.viewpoints import viewpoints
 from tests.helpers.machines.waiting import LIMIT_S
 
 WIDTH, HEIGHT = 320, 240

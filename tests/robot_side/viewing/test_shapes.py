@@ -10,7 +10,7 @@ from common.protocol.codec import VIEW_MAXIMUM_BYTES, decode_view
 from common.protocol.messages import Header
 from common.protocol.view_messages import SceneShapes, SceneState, Shape
 from common.roles import Role
-from robot_side.core import RobotSide
+from robot_side.core.robot_side import RobotSide
 from robot_side.drivers.mujoco.scene import Scene, load_scene
 from robot_side.parts import build_parts
 from robot_side.settings import RobotSettings

@@ -9,10 +9,10 @@ from common.protocol.codec import decode, decode_view, encode
 from common.protocol.link_end import LinkEnd
 from common.protocol.messages import StiffnessUpdate, Watch
 from common.protocol.view_messages import AnyViewMessage, SceneShapes, SceneState, VideoFrame, VideoStep
-from robot_side.core import RobotSide
+from robot_side.core.robot_side import RobotSide
 from robot_side.parts import build_parts
-from robot_side.reporting.outgoing_messages import Outgoing, OutgoingStream
 from robot_side.settings import RobotSettings
+from robot_side.tick.outgoing import Outgoing, OutgoingStream
 from robot_side.viewing.exchange import Order
 from robot_side.viewing.scene_view import SceneView
 from robot_side.viewing.shapes import SceneModel
@@ -47,7 +47,7 @@ class Table:
         view = SceneView(
             SceneModel(self.parts.scene), self.parts.kinematics, self.parts.explains, self.parts.surroundings
         )
-        self.looking = ViewScheduler(self.robot, view, self.desk.cameras, self, always=self.always)
+        self.looking = ViewScheduler(self.robot.session, view, self.desk.cameras, self, always=self.always)
         self.end = LinkEnd("operator", 5, "clock")
         self.watching: dict[str, Any] = {}
         self.ticks = 0
@@ -81,7 +81,7 @@ class Table:
             if self.ticks % 100 == 0:
                 self.hear(encode(self.end.hello(self.now_s)))
             self._push(self.robot.tick(self.now_s))
-            self._push(self.looking.idle(self.now_s, self.now_s))
+            self._push(self.looking.idle(self.now_s, self.now_s, self.robot.newest))
             self._render()
             for stream, line in self.lines.items():
                 for message in line.pop(self.now_s):

@@ -11,7 +11,8 @@ import pytest
 from common.arrays import FloatArray
 from common.roles import Role
 from robot_side.drivers.mujoco.scene import Scene, load_scene
-from robot_side.drivers.mujoco.true_contact import ContactOnset, TrueContact
+from robot_side.drivers.mujoco.true_contact import TrueContact
+from robot_side.tick.truth import ContactOnset
 from tests.helpers.repository import DATA
 
 STEP_S = 0.001

@@ -4,7 +4,7 @@ import pytest
 
 from common.errors import ConfigurationError
 from common.roles import Role
-from robot_side.core import RobotSide
+from robot_side.core.robot_side import RobotSide
 from robot_side.drivers.mujoco.scene import Scene
 from robot_side.drivers.remote.connected_drivers import ConnectedDrivers
 from robot_side.parts import build_parts

@@ -32,3 +32,16 @@ class Truth:
     """Pairs (geom of the gripper, object) that are in contact now, supports included"""
     target: TargetTruth | None = None
     """True pose and motion of the target; None without a target"""
+
+
+@dataclass(frozen=True)
+class ContactOnset:
+    """Beginning of a contact."""
+
+    thing: str
+    """Name of the object that is touched"""
+    gripper_part: str
+    """Name of the geom, of the gripper or of the held object, that touches it"""
+    closing_speed_m_s: float
+    """Closing speed of the touching points along the contact's normal, before the physics step that
+    found the contact"""

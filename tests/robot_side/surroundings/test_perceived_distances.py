@@ -5,19 +5,20 @@ import pytest
 
 from common.roles import Role
 from robot_side.gripper.near_order import near_order
-from robot_side.gripper.perceived_distances import PerceivedDistances, perceived_distances
+from robot_side.surroundings.perceived_distances import PerceivedDistances, perceived_distances
 from robot_side.surroundings.scene_table import scene_table
 from tests.helpers.field.nearest_point import distance_to_object
 from tests.helpers.gripper_poses import cover_gripper, free_pose
 from tests.helpers.perceived_scenes import Scene, random_scene
 
 POSE = free_pose([[0.0, 0.0, 0.0], [0.0, 0.0, -0.1]], [0.02, 0.03])
+SPHERES = POSE.sphere_centers_m, POSE.sphere_radii_m
 
 
 def test_the_nearest_and_the_target_are_found_far_and_near() -> None:
     scene = Scene().add(Role.SUPPORT).half_space([0.0, 0.0, 1.0], -0.14)
     scene.add(Role.TARGET).sphere([0.0, 0.0, 2.0], 0.1).add().box([0.5, 0.0, 0.0], [0.1, 0.1, 0.1])
-    apart = perceived_distances(POSE, scene_table(scene.objects()), 1, None)
+    apart = perceived_distances(*SPHERES, scene_table(scene.objects()), 1, None)
     assert apart.nearest == "object2"
     assert apart.nearest_m == pytest.approx(0.37)
     assert apart.target_m == pytest.approx(1.88)
@@ -25,10 +26,10 @@ def test_the_nearest_and_the_target_are_found_far_and_near() -> None:
 
 def test_what_is_held_or_too_far_is_no_distance() -> None:
     objects = Scene().add(Role.TARGET).sphere([0.0, 0.0, 0.05], 0.01).add().sphere([0.0, 9.0, 0.0], 0.1).objects()
-    assert perceived_distances(POSE, scene_table(objects), 0, 0) == PerceivedDistances()
-    assert perceived_distances(POSE, scene_table(objects), 0, None).target_m == pytest.approx(0.02)
-    assert perceived_distances(POSE, scene_table(objects), 1, None).target_m is None
-    assert perceived_distances(POSE, scene_table(Scene().objects()), None, None) == PerceivedDistances()
+    assert perceived_distances(*SPHERES, scene_table(objects), 0, 0) == PerceivedDistances()
+    assert perceived_distances(*SPHERES, scene_table(objects), 0, None).target_m == pytest.approx(0.02)
+    assert perceived_distances(*SPHERES, scene_table(objects), 1, None).target_m is None
+    assert perceived_distances(*SPHERES, scene_table(Scene().objects()), None, None) == PerceivedDistances()
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -42,7 +43,7 @@ def test_it_is_the_least_over_all_spheres_and_objects(seed: int) -> None:
         else np.inf
         for index, role in enumerate(objects.roles)
     ]
-    apart = perceived_distances(POSE, scene_table(objects), None, None)
+    apart = perceived_distances(*SPHERES, scene_table(objects), None, None)
     assert apart.nearest == objects.names[int(np.argmin(expected))]
     assert apart.nearest_m == pytest.approx(min(expected), abs=1e-9)
 

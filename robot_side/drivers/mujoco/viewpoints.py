@@ -1,12 +1,21 @@
 """Viewpoints of the two views of §4.3: cameras of the model, or else poses that exist for every arm."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import msgspec
 import numpy as np
 
 from common.arrays import FloatArray
 from common.protocol.view_messages import Eye, ViewName
 from robot_side.arm.stick_frames import Frame, StickFrames
-from robot_side.drivers.mujoco.scene import Scene
-from robot_side.viewing.exchange import Triple, Viewpoint
+
+if TYPE_CHECKING:
+    # A rendering process uses `Viewpoint` alone, and loads no scene.
+    from robot_side.drivers.mujoco.scene import Scene
+
+Triple = tuple[float, float, float]
 
 _OVERVIEW = "overview"
 _DOWN_DEG, _ASIDE_DEG = 55.0, 20.0
@@ -17,6 +26,20 @@ _LEAST_ALONG = 0.5
 """Cosine of the largest angle, 60°, between the approach axis and the line of sight of a camera that shows it"""
 _CLEARANCE_M = 0.05
 _WIDE_DEG = 70.0
+
+
+class Viewpoint(msgspec.Struct, frozen=True):
+    """Viewpoint of a view: a camera of the model; without one, a pose in the frame of a body."""
+
+    camera: int | None = None
+    body: int = 0
+    position_m: Triple = (0.0, 0.0, 0.0)
+    forward: Triple = (1.0, 0.0, 0.0)
+    """Unit vector"""
+    up: Triple = (0.0, 0.0, 1.0)
+    """Unit vector, orthogonal to `forward`"""
+    fovy_deg: float = 45.0
+    """Vertical field of view: angle from the picture's lower edge to its upper edge"""
 
 
 def viewpoints(scene: Scene) -> dict[ViewName, Viewpoint]:

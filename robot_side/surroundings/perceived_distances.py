@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from common.arrays import FloatArray
 from common.roles import Role
-from robot_side.arm.port import GripperPose
 from robot_side.surroundings.distances import object_distances
 from robot_side.surroundings.scene_table import SceneTable
 
@@ -25,14 +25,17 @@ class PerceivedDistances:
 
 
 def perceived_distances(
-    pose: GripperPose, scene: SceneTable, target: int | None, held: int | None
+    centers_m: FloatArray, radii_m: FloatArray, scene: SceneTable, target: int | None, held: int | None
 ) -> PerceivedDistances:
-    """Return the distances in one frame; `target` and `held` are indices of objects, or None."""
+    """Return the distances in one frame from the gripper's spheres: centres (m, 3), radii (m,).
+
+    target, held: indices of objects, or None.
+    """
     wanted = target if target != held else None
     objects, reach_m, distances_m = scene.objects, _FIRST_REACH_M, np.full(len(scene.objects.names), np.inf)
     # No object within the reach is missed, so the search can end once both are found.
     while reach_m <= _FARTHEST_M:
-        distances_m = object_distances(pose.sphere_centers_m, pose.sphere_radii_m, scene, reach_m)
+        distances_m = object_distances(centers_m, radii_m, scene, reach_m)
         for index in np.flatnonzero(np.isfinite(distances_m)):
             if index == held or objects.roles[index] is Role.SUPPORT:
                 distances_m[index] = np.inf

@@ -6,8 +6,8 @@ import pytest
 from common.arrays import FloatArray
 from common.protocol.messages import Header, MotionCommand
 from robot_side.arm.port import Arm, ArmState
+from robot_side.core.motion import Motion
 from robot_side.gripper.grip import Grip
-from robot_side.motion import Motion
 from robot_side.operators.safety import Permission
 from robot_side.parts import build_parts
 from robot_side.settings import RobotSettings

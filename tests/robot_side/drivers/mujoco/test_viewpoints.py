@@ -5,7 +5,7 @@ import pytest
 
 from common.protocol.view_messages import VIEW_NAMES, ViewName
 from robot_side.drivers.mujoco.scene import load_scene
-from robot_side.viewing.viewpoints import first_person_eye, overview_eye, viewpoints
+from robot_side.drivers.mujoco.viewpoints import first_person_eye, overview_eye, viewpoints
 from tests.helpers.arm_models import planar_arm
 from tests.robot_side.viewing.picture_taking import HEIGHT, WIDTH, project
 

@@ -7,79 +7,34 @@ arm ─▶ kinematics ─▶ law: contact ahead ─▶ stiffness fields ─▶ p
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, Final
 
 import msgspec
 import numpy as np
 
-from common.arrays import FloatArray
 from common.status.codes import LinkState
 from common.status.statuses import RobotStatus
-from common.timing.ages import LoopAge
-from robot_side.arm.ability import JointLimits
-from robot_side.arm.following import Following
 from robot_side.arm.joint_estimate import JointEstimate, lateness_s
-from robot_side.arm.port import Arm, ArmState, GripperKinematics
-from robot_side.arm.stick_frames import StickFrames
-from robot_side.arm.tool_motion import ToolMotionSettings
-from robot_side.events import Found, Listener, Listeners, Tick
+from robot_side.arm.port import ArmState
+from robot_side.core.homing import CLEAR_M, Homing
+from robot_side.core.motion import Motion
+from robot_side.core.robot_parts import RobotParts
 from robot_side.gripper.grip import Grip
-from robot_side.gripper.held_covers import HeldCovers
-from robot_side.gripper.perceived_distances import perceived_distances
-from robot_side.homing import CLEAR_M, Homing
-from robot_side.laws.law import Law
-from robot_side.motion import Motion
-from robot_side.operators.operator_session import OperatorSession
-from robot_side.outcome.figures import Observer, RunFigures
+from robot_side.outcome.figures import RunFigures
 from robot_side.outcome.placing import scaled
-from robot_side.reporting.outgoing_messages import SHOWN_NAME, Outgoing
 from robot_side.reporting.reports import Reports
 from robot_side.surroundings.distances import object_distances
-from robot_side.surroundings.perceived import ObjectSource
-from robot_side.surroundings.surroundings import Sight, Surroundings
+from robot_side.surroundings.perceived_distances import perceived_distances
+from robot_side.surroundings.surroundings import Sight
+from robot_side.tick.events import Found, Listener, Listeners, Tick
+from robot_side.tick.outgoing import SHOWN_NAME, Outgoing
 from robot_side.tick.sensed import Sensed
 from robot_side.tick.situation import Situation
 
 _TRIED_RAD: Final = 0.1
 _LEVER_M: Final = 0.1
 """Turn of a joint, and lever from which what it turns may meet something: what is nearer stands beside it anyway"""
-
-
-@dataclass(frozen=True, kw_only=True)
-class RobotParts:
-    """Parts of a core.
-
-    To use another arm, camera or law, `replace` that part. Each set of parts serves only one core.
-    """
-
-    arm: Arm
-    kinematics: GripperKinematics
-    camera: ObjectSource
-    law: Law
-    surroundings: Surroundings
-    session: OperatorSession
-    loop_age: LoopAge
-    limits: JointLimits
-    motion: ToolMotionSettings
-    following: Following | None = None
-    """Judge of the arm's motion; None: one that tells joints by their numbers"""
-    misplaced_m: float = 0.01
-    """Distance by which things may be nearer than they are perceived, by the errors of camera and arm"""
-    home_rad: FloatArray | None = None
-    """(n,) joint positions of the start pose; None: there is no way home"""
-    frames: StickFrames | None = None
-    """Frames in which an operator may steer besides the tool's; None: as the tool's"""
-    truth: Observer | None = None
-    """Observer of true contacts and distances, for the figures; None if these are unknown"""
-    held_covers: HeldCovers | None = None
-    assists: bool = False
-    """Whether to limit the speed along the triggers (see `speed_assist`)"""
-    full_rate: bool = False
-    """Whether to send a stiffness message in every tick"""
-    seed: int = 0
-    notes: tuple[str, ...] = ()
-    """Notes about the scene for a person, shown before the run"""
 
 
 class RobotSide:
@@ -93,7 +48,7 @@ class RobotSide:
         self.motion = Motion(parts.arm, parts.limits, parts.motion, parts.following, assists=parts.assists)
         home = parts.kinematics, parts.surroundings
         self.homing = None if parts.home_rad is None else Homing(parts.home_rad, parts.limits, *home)
-        self.reports = Reports(parts.session, parts.law, parts.frames, full_rate=parts.full_rate)
+        self.reports = Reports(parts.session, parts.law.around, parts.frames, full_rate=parts.full_rate)
         self.figures = RunFigures(parts.seed, parts.truth)
         self.newest: tuple[Sensed, Situation] | None = None
         """Result of the law in the last tick, and the situation for which it was computed"""
@@ -179,10 +134,10 @@ class RobotSide:
         sensed = parts.law.sense(situation, now_s)
         self.newest = sensed, situation
         begin("messages")
-        stands = grip.touchdown.stands
-        outgoing = self.reports.outgoing(permission, situation, sensed, self.motion, stands, now_s)
+        done = self.motion.told_m_s, grip.touchdown.stands, self.motion.hindrance.text is not None
+        outgoing = self.reports.outgoing(permission, situation, sensed, *done, now_s)
         holds_target = grip.index is not None and grip.index == sight.target
-        found = permission, self.motion.commanded_rad_s, state, situation, sensed
+        found = permission.state, self.motion.commanded_rad_s, state, situation, sensed
         self._found = Found(*found, holds_target, sight.target_m)
         return outgoing
 
@@ -232,10 +187,10 @@ class RobotSide:
         self._heard.on_step("frame")
         seen: list[Outgoing] = []
         if (found := self._found) is not None:
-            permission, _, state, situation, sensed, _, target_m = found
+            motion_state, _, state, situation, sensed, _, target_m = found
             target = None if self.sight.target is None else situation.objects.names[self.sight.target]
             shown = situation, sensed, state, target, target_m, self.motion.hindrance
-            seen = self.reports.telemetry(permission.state, *shown, now_s)
+            seen = self.reports.telemetry(motion_state, *shown, now_s)
         self.sight.see(now_s)
         self._heard.on_step("end")
         self._heard.on_sent(now_s)
@@ -264,7 +219,8 @@ class RobotSide:
         sensed, situation = self.newest
         pose = situation.pose
         target = self.sight.target
-        apart = perceived_distances(pose, self.parts.surroundings.see(objects), target, self.grip.index)
+        spheres = pose.sphere_centers_m, pose.sphere_radii_m
+        apart = perceived_distances(*spheres, self.parts.surroundings.see(objects), target, self.grip.index)
         return msgspec.structs.replace(
             status,
             l2=sensed.l2.stiffness,

@@ -8,10 +8,10 @@ from typing import Final, Literal, NamedTuple, get_args
 
 from common.arrays import FloatArray
 from common.episode import EpisodeMark
+from common.protocol.messages import MotionState
 from robot_side.arm.port import ArmState
-from robot_side.operators.safety import Permission
-from robot_side.reporting.outgoing_messages import Outgoing
 from robot_side.surroundings.perceived import PerceivedObjects
+from robot_side.tick.outgoing import Outgoing
 from robot_side.tick.sensed import Sensed
 from robot_side.tick.situation import Situation
 
@@ -23,7 +23,7 @@ operators have left, telemetry is made and the camera read. `end`: no step runs 
 class Found(NamedTuple):
     """Results of a tick that did not fail."""
 
-    permission: Permission
+    motion_state: MotionState
     commanded_rad_s: FloatArray | None
     """(n,) commanded joint velocities; None: the arm is to stand still"""
     state: ArmState

@@ -10,12 +10,12 @@ from common.protocol.messages import Header
 from common.roles import Role
 from common.silence import KEEP_ALIVE_S
 from common.status.codes import LinkState
-from robot_side.core import RobotSide
+from robot_side.core.robot_side import RobotSide
 from robot_side.drivers.mujoco.scene import load_scene
-from robot_side.events import Listener, Tick
 from robot_side.gripper.held_object import grip
 from robot_side.parts import build_parts
 from robot_side.settings import RobotSettings
+from robot_side.tick.events import Listener, Tick
 from robot_side.tick.situation import Situation
 from tests.robot_side.session_bench import Bench, Operator
 

@@ -1,0 +1,1 @@
+"""Steps of a tick in their order, without I/O."""
