@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -36,7 +37,6 @@ from robot_side.drivers.remote.arm import RemoteArm
 from robot_side.drivers.remote.connected_drivers import ConnectedDrivers
 from robot_side.drivers.remote.driver_session import ArmShape
 from robot_side.drivers.remote.frame_message import perceived
-from robot_side.enlargement.prediction_errors import BUILT_IN, PredictionErrors, load_prediction_errors
 from robot_side.gripper.held_covers import HeldCovers
 from robot_side.gripper.kept_covers import SearchNotes
 from robot_side.laws.named import LAWS
@@ -47,7 +47,9 @@ from robot_side.operators.tuning import Tuning
 from robot_side.settings import RobotSettings
 from robot_side.surroundings.perceived import KINDS, PerceivedObjects
 from robot_side.surroundings.surroundings import Surroundings
-from robot_side.tick.explained import Explains
+
+if TYPE_CHECKING:
+    from robot_side.laws.named import NamedLaw
 
 _NAMED_OBJECTS = 8
 """Maximum number of objects that a note names"""
@@ -61,7 +63,7 @@ class SceneParts(RobotParts):
     scene: Scene
     any_objects: bool
     """Whether objects of any kind may appear during the run"""
-    explains: Explains
+    explains: "NamedLaw"
     """Law named in the settings, even if an experiment replaces `law`"""
 
     @property
@@ -117,7 +119,7 @@ def build_parts(
     slides = scene.model.jnt_type[scene.robot.arm_joints] == JointKind.SLIDE
     joint_limits = limits.of_joints(arm.joint_count, *ends_rad, slides)
     surroundings = Surroundings()
-    prediction, prediction_note = _prediction_errors(settings, scene)
+    prediction, prediction_note = settings.prediction_for(scene.robot.fingerprint)
     errors = settings.uncertainty(prediction)
     law = LAWS[settings.law](
         errors,
@@ -259,19 +261,3 @@ def _roles(roles: Mapping[str, Role]) -> str:
             more = [f"and {len(names) - _NAMED_OBJECTS} more"] if len(names) > _NAMED_OBJECTS else []
             shown.append(f"{role.value}: {', '.join([*names[:_NAMED_OBJECTS], *more])}")
     return "; ".join(shown) or "none"
-
-
-def _prediction_errors(settings: RobotSettings, scene: Scene) -> tuple[PredictionErrors, tuple[str, ...]]:
-    """Return the prediction errors of this arm, and a note if they have not been measured."""
-    if settings.prediction_errors is not None:
-        return load_prediction_errors(settings.prediction_errors), ()
-    built_in = load_prediction_errors(BUILT_IN)
-    # Measured in the simulation: a real arm of the same model may move differently.
-    if built_in.arm == scene.robot.fingerprint and settings.arm is None:
-        return built_in, ()
-    note = (
-        "the prediction error of the commands under way has not been measured on this arm: a fifth of the distance at"
-        " full speed in the loop age is added (to measure it: feelahead bench error --table FILE.toml, then"
-        " --prediction-errors FILE.toml)"
-    )
-    return PredictionErrors(), (note,)

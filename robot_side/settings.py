@@ -15,7 +15,7 @@ from robot_side.arm.tool_motion import ToolMotionSettings
 from robot_side.drivers.mujoco.built_in_scenes import SceneName
 from robot_side.drivers.mujoco.robot_model import SiteAxis
 from robot_side.enlargement.distance import Uncertainty, Vector3
-from robot_side.enlargement.prediction_errors import PredictionErrors
+from robot_side.enlargement.prediction_errors import BUILT_IN, PredictionErrors, load_prediction_errors
 from robot_side.laws.named import LawName
 from robot_side.operators.safety import SafetySettings
 from robot_side.viewing.settings import CamerasSettings
@@ -148,3 +148,18 @@ class RobotSettings(SideOptions):
             kinematic_mean_m=self.kinematic_mean_m,
             prediction=prediction,
         )
+
+    def prediction_for(self, arm: str) -> tuple[PredictionErrors, tuple[str, ...]]:
+        """Return the prediction errors of the arm with this fingerprint, and a note if they have not been measured."""
+        if self.prediction_errors is not None:
+            return load_prediction_errors(self.prediction_errors), ()
+        built_in = load_prediction_errors(BUILT_IN)
+        # Measured in the simulation: a real arm of the same model may move differently.
+        if built_in.arm == arm and self.arm is None:
+            return built_in, ()
+        note = (
+            "the prediction error of the commands under way has not been measured on this arm: a fifth of the distance"
+            " at full speed in the loop age is added (to measure it: feelahead bench error --table FILE.toml, then"
+            " --prediction-errors FILE.toml)"
+        )
+        return PredictionErrors(), (note,)

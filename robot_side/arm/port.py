@@ -2,12 +2,15 @@
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol
+from typing import Final, Protocol
 
 import numpy as np
 
 from common.arrays import BoolArray, FloatArray
 from common.clock import Clock
+
+CLUSTER: Final = 6
+"""Number of consecutive spheres of a gripper that share one bounding sphere, so they should be near each other"""
 
 
 @dataclass

@@ -8,10 +8,11 @@ import math
 from typing import NamedTuple
 
 from common.arrays import BoolArray, FloatArray
+from robot_side.arm.port import CLUSTER
 from robot_side.compiled.kernel import FLOAT64, compiled, inlined, input_array, output_array
 from robot_side.compiled.vectors import Vector, add, cross, dot, load, norm, scale, subtract
 from robot_side.enlargement.distance import statistical_distance
-from robot_side.field.scratch import CLUSTER, Error, ScratchColumns
+from robot_side.field.scratch import Error, ScratchColumns
 
 Spread = tuple[float, Vector, Vector, Vector]
 """Quadratic form in a point's position (x, y, z) from the tool: the constant; the factors of x, y and z; those of x²,

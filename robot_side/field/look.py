@@ -10,6 +10,7 @@ import math
 from typing import Final
 
 from common.arrays import BoolArray, FloatArray, IntArray
+from robot_side.arm.port import CLUSTER
 from robot_side.compiled.columns import BUNDLE
 from robot_side.compiled.kernel import (
     BOOL,
@@ -28,7 +29,7 @@ from robot_side.field.object_class import SKIPPED
 from robot_side.field.pairs import enter, pairs_of
 from robot_side.field.profile import follow
 from robot_side.field.samples import Profile
-from robot_side.field.scratch import CLUSTER, SCRATCH, STRENGTHS, Bundles, Count, Error, ScratchColumns
+from robot_side.field.scratch import SCRATCH, STRENGTHS, Bundles, Count, Error, ScratchColumns
 from robot_side.surroundings.any_kind import contact
 from robot_side.surroundings.bounds import passes
 from robot_side.surroundings.kinds.layout import HALF_SPACE, MESH

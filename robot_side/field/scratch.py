@@ -6,13 +6,12 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from common.arrays import BoolArray, FloatArray, IntArray
+from robot_side.arm.port import CLUSTER
 from robot_side.compiled.columns import FLAGS, INDICES, NUMBERS, Declared, records, rows
 
 STRENGTHS: Final = 8
 TOUCH_STRENGTH: Final = 4
 """Highest strength in slow zones for an object that is to be touched"""
-CLUSTER: Final = 6
-"""Number of consecutive gripper spheres that share one bounding sphere"""
 SAMPLES: Final = 4
 """Number of steps into which samples divide an overlap profile's margin; even, so that one sample is in the middle"""
 

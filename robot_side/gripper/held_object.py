@@ -7,8 +7,6 @@ import numpy as np
 from common.arrays import BoolArray, FloatArray
 from common.roles import Role
 from robot_side.arm.port import GripperPose
-from robot_side.compiled.kernel import compiled, input_array, output_array
-from robot_side.compiled.vectors import dot, load
 from robot_side.gripper.held_covers import HeldCovers
 from robot_side.surroundings.distances import object_distances
 from robot_side.surroundings.perceived import PerceivedObjects
@@ -65,19 +63,7 @@ def grip(objects: PerceivedObjects, index: int, pose: GripperPose, covers: HeldC
 
 def with_held(pose: GripperPose, held: HeldObject) -> GripperPose:
     """Return the pose with the spheres of the gripper and of the held object, which moves with the tool."""
-    centers_m = np.empty((len(held.radii_m), 3))
-    _join(pose.sphere_centers_m, held.centers_in_tool_m, pose.tool_position_m, pose.tool_rotation, centers_m)
+    held_m = pose.tool_position_m + held.centers_in_tool_m @ pose.tool_rotation.T
+    centers_m = np.concatenate([pose.sphere_centers_m, held_m])
     spheres = centers_m, held.radii_m, held.on_finger
     return GripperPose(pose.tool_position_m, pose.tool_rotation, pose.tool_jacobian, *spheres)
-
-
-@compiled(input_array(2), input_array(2), input_array(1), input_array(2), output_array(2))
-def _join(own: FloatArray, held: FloatArray, tool: FloatArray, rotation: FloatArray, centers: FloatArray) -> None:
-    """Fill `centers` (m + k, 3): the gripper's `own` (m, 3), then t + R c of the `held` (k, 3) in the tool frame."""
-    first = own.shape[0]
-    for i in range(first):
-        for axis in range(3):
-            centers[i, axis] = own[i, axis]
-    for i in range(held.shape[0]):
-        for axis in range(3):
-            centers[first + i, axis] = tool[axis] + dot(load(rotation, axis), load(held, i))

@@ -1,4 +1,4 @@
-"""What a law is given in each tick."""
+"""Situation of one tick, as a law gets it."""
 
 from dataclasses import dataclass
 

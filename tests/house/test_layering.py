@@ -52,13 +52,12 @@ ARROWS = """
     robot_side/surroundings: common robot_side/compiled robot_side/overlap/meshes robot_side/surroundings/kinds
     robot_side/field: common robot_side/arm robot_side/compiled robot_side/enlargement robot_side/surroundings
         robot_side/surroundings/kinds
-    robot_side/gripper: common common/files robot_side/arm robot_side/compiled robot_side/overlap/meshes
-        robot_side/surroundings
+    robot_side/gripper: common common/files robot_side/arm robot_side/overlap/meshes robot_side/surroundings
     robot_side/tick: common common/protocol robot_side/arm robot_side/surroundings
     robot_side/drivers/remote: common common/sockets common/timing robot_side/arm robot_side/surroundings
     robot_side/laws: common common/protocol robot_side/arm robot_side/compiled robot_side/enlargement robot_side/field
         robot_side/surroundings robot_side/tick
-    robot_side/drivers/mujoco: common common/files common/protocol robot_side/arm robot_side/compiled robot_side/field
+    robot_side/drivers/mujoco: common common/files common/protocol robot_side/arm robot_side/compiled
         robot_side/gripper robot_side/overlap/meshes robot_side/surroundings robot_side/surroundings/kinds
         robot_side/tick/truth.py
     robot_side/reporting: common common/emulation common/protocol common/rate common/sockets robot_side/arm
@@ -75,9 +74,8 @@ ARROWS = """
     robot_side/settings.py: common common/command robot_side/arm robot_side/drivers/mujoco robot_side/enlargement
         robot_side/laws/named.py robot_side/operators robot_side/viewing
     robot_side/parts.py: common common/protocol common/timing robot_side/arm robot_side/compiled robot_side/core
-        robot_side/drivers/mujoco robot_side/drivers/mujoco/checks robot_side/drivers/remote robot_side/enlargement
-        robot_side/gripper robot_side/laws/named.py robot_side/operators robot_side/settings.py
-        robot_side/surroundings robot_side/tick
+        robot_side/drivers/mujoco robot_side/drivers/mujoco/checks robot_side/drivers/remote robot_side/gripper
+        robot_side/laws/named.py robot_side/operators robot_side/settings.py robot_side/surroundings
     robot_side: common common/command common/emulation common/loop common/protocol common/realtime common/recording
         common/sockets common/status robot_side/arm robot_side/compiled robot_side/core robot_side/drivers/mujoco
         robot_side/drivers/remote robot_side/parts.py robot_side/recording robot_side/reporting robot_side/settings.py
@@ -179,6 +177,13 @@ LIBRARIES = {
 """Rooms and files that may import each library, or use a clock"""
 
 
+PLAN = {"common": (28, 50, 7), "robot_side": (22, 80, 10), "operator_side": (20, 70, 9)}
+"""Most rooms, arrows and floors of a package. Here each file or folder directly in the package is a room.
+
+Arrow: some file of one room imports a file of the other. Floors: rooms in the longest chain of arrows.
+"""
+
+
 def _read_arrows() -> dict[str, tuple[str, ...]]:
     rows = ARROWS.replace("\n        ", " ").strip().splitlines()
     return {room.strip(): tuple(to.split()) for room, _, to in (row.partition(":") for row in rows)}
@@ -234,6 +239,11 @@ def _lies_in(path: Path, place: str) -> bool:
     return name == place or name.startswith(f"{place}/")
 
 
+def _entry(path: Path) -> tuple[str, ...]:
+    """Return the package of `path`, and the entry of the package's folder that contains it."""
+    return path.relative_to(ROOT).with_suffix("").parts[:2]
+
+
 def every_import() -> Iterator[tuple[Path, str]]:
     return ((path, module) for path in modules().values() for module in sorted(imports(path)))
 
@@ -285,6 +295,24 @@ def test_no_circle_of_rooms_and_none_of_modules() -> None:
             list(TopologicalSorter(kind).static_order())
         except CycleError as error:
             pytest.fail(f"a circle: {' -> '.join(error.args[1])}")
+
+
+@pytest.mark.parametrize("package", PLAN)
+def test_the_plan_does_not_creep(package: str) -> None:
+    below: dict[str, set[str]] = {}
+    for path in modules().values():
+        mine, *entry = _entry(path)
+        if mine == package and entry != ["__init__"]:
+            others = [_entry(modules()[module]) for module in imports(path) if module in modules()]
+            below.setdefault(entry[0], set()).update(other[1] for other in others if other[0] == package)
+    floors: dict[str, int] = {}
+    graph = {room: to - {room} for room, to in below.items()}
+    for room in TopologicalSorter(graph).static_order():
+        floors[room] = 1 + max((floors[other] for other in graph[room]), default=0)
+    found = len(graph), sum(map(len, graph.values())), max(floors.values())
+    assert all(count <= most for count, most in zip(found, PLAN[package], strict=True)), (
+        f"{package} has {found} rooms, arrows and floors; valid: at most {PLAN[package]}"
+    )
 
 
 def test_every_named_place_exists() -> None:

@@ -10,12 +10,11 @@ from scipy.spatial.transform import Rotation
 from common.arrays import FloatArray, IntArray
 from common.errors import ConfigurationError
 from robot_side.arm.forward_kinematics import JOINT, LINK, POINT, LinkTree, Records, place
-from robot_side.arm.port import ArmState, GripperPose
+from robot_side.arm.port import CLUSTER, ArmState, GripperPose
 from robot_side.drivers.mujoco.hand.gripper_cover import cover_gripper
 from robot_side.drivers.mujoco.model_enums import GeomKind, JointKind
 from robot_side.drivers.mujoco.robot_model import RobotModel, can_touch
 from robot_side.drivers.mujoco.scene import Scene
-from robot_side.field.scratch import CLUSTER
 from robot_side.gripper.kept_covers import SearchNotes
 from robot_side.gripper.near_order import near_order
 

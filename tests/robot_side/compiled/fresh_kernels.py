@@ -7,7 +7,7 @@ from robot_side.compiled.kernel import Compiled, imported_kernels
 NAMES = (
     "robot_side.drivers.mujoco.encoders._read",
     "robot_side.arm.joint_estimate._estimate_loop",
-    "robot_side.gripper.held_object._join",
+    "robot_side.surroundings.target._center",
 )
 
 
