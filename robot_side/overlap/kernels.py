@@ -16,14 +16,14 @@ import numpy as np
 from common.arrays import FloatArray, IntArray
 from robot_side.compiled.kernel import BOOL, Compiled, compiled, inlined, input_array, output_array
 from robot_side.compiled.vectors import load
+from robot_side.overlap.box_batch import overlap_boxes
 from robot_side.overlap.checks.arguments import LARGEST, SMALLEST_NORMAL
-from robot_side.overlap.closed_forms.ball import sphere_overlap
-from robot_side.overlap.closed_forms.half_space import half_space_overlap
-from robot_side.overlap.closed_forms.solid import Overlap, Overlaps
-from robot_side.overlap.lanes.box_batch import overlap_boxes
-from robot_side.overlap.lanes.lanes import reach
-from robot_side.overlap.lanes.tetrahedron_batch import overlap_tetrahedra
+from robot_side.overlap.lanes import reach
 from robot_side.overlap.precise.kernels import precise_boxes, precise_tetrahedra
+from robot_side.overlap.solids.ball import sphere_overlap
+from robot_side.overlap.solids.half_space import half_space_overlap
+from robot_side.overlap.solids.solid import Overlap, Overlaps
+from robot_side.overlap.tetrahedron_batch import overlap_tetrahedra
 
 _RESULTS = output_array(1), output_array(2), output_array(1)
 

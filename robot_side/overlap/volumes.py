@@ -28,7 +28,6 @@ import numpy.typing as npt
 
 from common.arrays import FloatArray
 from robot_side.overlap.checks.arguments import Check, broadcast, directions, lengths, numbers, plain_rows, rotations
-from robot_side.overlap.closed_forms.solid import Overlaps
 from robot_side.overlap.kernels import (
     DoubtfulNumbersError,
     box_pairs,
@@ -36,6 +35,7 @@ from robot_side.overlap.kernels import (
     sphere_pairs,
     tetrahedron_pairs,
 )
+from robot_side.overlap.solids.solid import Overlaps
 
 Array = npt.ArrayLike
 

@@ -39,16 +39,13 @@ ARROWS = """
     robot_side/overlap/digits: common robot_side/compiled
     robot_side/arm: common common/protocol robot_side/compiled
     robot_side/enlargement: common common/protocol robot_side/compiled
-    robot_side/overlap/closed_forms: common robot_side/compiled robot_side/overlap/digits
-    robot_side/overlap/lanes: common robot_side/compiled robot_side/overlap/checks robot_side/overlap/closed_forms
-        robot_side/overlap/digits
-    robot_side/overlap/precise: common robot_side/compiled robot_side/overlap/closed_forms robot_side/overlap/digits
-    robot_side/overlap/meshes: common robot_side/compiled robot_side/overlap/checks robot_side/overlap/closed_forms
-        robot_side/overlap/digits
-    robot_side/overlap: common robot_side/compiled robot_side/overlap/checks robot_side/overlap/closed_forms
-        robot_side/overlap/lanes robot_side/overlap/meshes robot_side/overlap/precise
-    robot_side/surroundings/kinds: common robot_side/compiled robot_side/overlap/closed_forms robot_side/overlap/lanes
-        robot_side/overlap/meshes
+    robot_side/overlap/solids: common robot_side/compiled robot_side/overlap/digits
+    robot_side/overlap/precise: common robot_side/compiled robot_side/overlap/digits robot_side/overlap/solids
+    robot_side/overlap/meshes: common robot_side/compiled robot_side/overlap/checks robot_side/overlap/digits
+        robot_side/overlap/solids
+    robot_side/overlap: common robot_side/compiled robot_side/overlap/checks robot_side/overlap/meshes
+        robot_side/overlap/precise robot_side/overlap/solids
+    robot_side/surroundings/kinds: common robot_side/compiled robot_side/overlap/meshes robot_side/overlap/solids
     robot_side/surroundings: common robot_side/compiled robot_side/overlap/meshes robot_side/surroundings/kinds
     robot_side/field: common robot_side/arm robot_side/compiled robot_side/enlargement robot_side/surroundings
         robot_side/surroundings/kinds

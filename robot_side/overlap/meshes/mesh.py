@@ -8,7 +8,6 @@ import numpy.typing as npt
 
 from common.arrays import FloatArray, IntArray
 from robot_side.overlap.checks.arguments import broadcast, lengths, numbers
-from robot_side.overlap.closed_forms.solid import Overlaps
 from robot_side.overlap.meshes.closed_surface import (
     checked_triangles,
     checked_vertices,
@@ -20,6 +19,7 @@ from robot_side.overlap.meshes.closed_surface import (
     signed_volume,
 )
 from robot_side.overlap.meshes.mesh_tables import mesh_tables
+from robot_side.overlap.solids.solid import Overlaps
 
 Array = npt.ArrayLike
 

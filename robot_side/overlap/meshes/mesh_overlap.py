@@ -7,13 +7,6 @@ from common.arrays import FloatArray, IntArray
 from robot_side.compiled.kernel import building_block, inlined
 from robot_side.compiled.transpose import transpose_four
 from robot_side.compiled.vectors import Vector, add, dot, scale
-from robot_side.overlap.closed_forms.solid import (
-    Overlap,
-    bounded,
-    nothing,
-    whole_solid,
-    whole_sphere,
-)
 from robot_side.overlap.digits.double_double import ZERO, divided, plus
 from robot_side.overlap.digits.double_double_vectors import PreciseVector, highs, precise_add, precise_scale
 from robot_side.overlap.meshes.large_triangles import FAR, corners_about, is_far, refine_lane
@@ -43,6 +36,13 @@ from robot_side.overlap.meshes.triangle_lanes import (
     times,
     triangle_geometry,
     triangle_terms,
+)
+from robot_side.overlap.solids.solid import (
+    Overlap,
+    bounded,
+    nothing,
+    whole_solid,
+    whole_sphere,
 )
 
 _WHOLE = 4.0 * math.pi

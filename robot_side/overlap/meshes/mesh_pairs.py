@@ -9,12 +9,12 @@ from common.arrays import FloatArray, IntArray
 from robot_side.compiled.kernel import compiled, input_array, input_indices, output_array, output_indices
 from robot_side.compiled.stack import on_stack
 from robot_side.compiled.vectors import dot, load, subtract
-from robot_side.overlap.closed_forms.solid import Overlaps
 from robot_side.overlap.meshes.mesh_kernels import PLACED_ARGUMENTS, TABLES, to_mesh, to_world
 from robot_side.overlap.meshes.mesh_overlap import mesh_overlap
 from robot_side.overlap.meshes.mesh_tables import MeshTables
 from robot_side.overlap.meshes.tree_queries import is_clear_of
 from robot_side.overlap.meshes.triangle_lanes import SCRATCH
+from robot_side.overlap.solids.solid import Overlaps
 
 _scratch = on_stack(SCRATCH)
 

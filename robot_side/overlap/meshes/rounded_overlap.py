@@ -8,12 +8,12 @@ import math
 from common.arrays import FloatArray, IntArray
 from robot_side.compiled.kernel import building_block, inlined
 from robot_side.compiled.vectors import Vector, dot, scale, subtract
-from robot_side.overlap.closed_forms.half_space import cap
-from robot_side.overlap.closed_forms.solid import bounded, sphere_volume
 from robot_side.overlap.meshes.mesh_overlap import NO_SUMS, box_distances_2, measured, solid_angle_inside, with_lanes
 from robot_side.overlap.meshes.mesh_tables import MeshTables
 from robot_side.overlap.meshes.tree_queries import corner_of, gather_near, is_inside, squared_distance
 from robot_side.overlap.meshes.triangle_lanes import LANES
+from robot_side.overlap.solids.half_space import cap
+from robot_side.overlap.solids.solid import bounded, sphere_volume
 
 _SAME_PLANE = 1e-9
 """Largest difference of the unit normals, and of the distances in radii, of two triangles that count as in one plane"""

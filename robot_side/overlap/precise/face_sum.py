@@ -14,7 +14,6 @@ import numpy as np
 from common.arrays import FloatArray
 from robot_side.compiled.kernel import building_block, inlined
 from robot_side.compiled.vectors import negative
-from robot_side.overlap.closed_forms.solid import Overlap
 from robot_side.overlap.digits.double_double import (
     PI,
     ZERO,
@@ -56,6 +55,7 @@ from robot_side.overlap.precise.features import (
     STARTS,
     distance_in_face,
 )
+from robot_side.overlap.solids.solid import Overlap
 
 
 @building_block

@@ -10,7 +10,6 @@ from common.arrays import FloatArray, IntArray
 from robot_side.compiled.kernel import compiled, inlined, input_array, input_indices, output_array
 from robot_side.compiled.stack import on_stack
 from robot_side.compiled.vectors import Vector, dot
-from robot_side.overlap.closed_forms.solid import Overlap
 from robot_side.overlap.digits.double_double import two_product, two_sum
 from robot_side.overlap.digits.double_double_vectors import (
     PreciseVector,
@@ -22,6 +21,7 @@ from robot_side.overlap.digits.double_double_vectors import (
 from robot_side.overlap.digits.expansion import determinant
 from robot_side.overlap.precise.features import BOX, DIRECTIONS, ENDS, POINTS, ROWS, STARTS, TETRAHEDRON
 from robot_side.overlap.precise.polyhedron import polyhedron_overlap
+from robot_side.overlap.solids.solid import Overlap
 
 LARGEST_REACH = 1e3
 """Distance from the sphere's centre, in radii, at which boxes are cut off"""

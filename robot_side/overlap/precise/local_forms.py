@@ -15,13 +15,13 @@ import numpy as np
 from common.arrays import FloatArray
 from robot_side.compiled.kernel import building_block, inlined
 from robot_side.compiled.vectors import Vector, add, norm, scale
-from robot_side.overlap.closed_forms.solid import Overlap, nothing
 from robot_side.overlap.digits.double_double_vectors import (
     PreciseVector,
     highs,
     precise_cross,
     precise_dot,
 )
+from robot_side.overlap.solids.solid import Overlap, nothing
 
 SHARP_CORNER = 4e-4
 """Largest sharpness for which `corner_overlap` is accurate. The sharpness is the largest, over the corner's edges, of

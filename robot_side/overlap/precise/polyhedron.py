@@ -13,8 +13,6 @@ import numpy as np
 from common.arrays import FloatArray
 from robot_side.compiled.kernel import building_block, inlined
 from robot_side.compiled.vectors import scale
-from robot_side.overlap.closed_forms.half_space import cap
-from robot_side.overlap.closed_forms.solid import Overlap, bounded, nothing, whole_solid, whole_sphere
 from robot_side.overlap.digits.double_double import rounded, times
 from robot_side.overlap.digits.double_double_vectors import (
     PreciseVector,
@@ -48,6 +46,8 @@ from robot_side.overlap.precise.features import (
     measure_all,
 )
 from robot_side.overlap.precise.local_forms import SHARP_CORNER, SHARP_EDGE, corner_overlap, edge_overlap
+from robot_side.overlap.solids.half_space import cap
+from robot_side.overlap.solids.solid import Overlap, bounded, nothing, whole_solid, whole_sphere
 
 NOTHING, WHOLE_SPHERE, FACE, EDGE, CORNER = 0, 1, 2, 3, 4
 """Kinds of what the ball reaches"""

@@ -6,8 +6,8 @@ from typing import Final
 from common.arrays import FloatArray
 from robot_side.compiled.kernel import inlined
 from robot_side.compiled.vectors import Vector, dot, negative
-from robot_side.overlap.closed_forms.half_space import half_space_overlap
-from robot_side.overlap.closed_forms.solid import Overlap
+from robot_side.overlap.solids.half_space import half_space_overlap
+from robot_side.overlap.solids.solid import Overlap
 from robot_side.surroundings.kinds.kind import Array, Check, Kind
 from robot_side.surroundings.kinds.layout import CLOSING, LEAST_CONTACT_M, NEVER, TOUCHING_M, Contact, Nearest
 

@@ -9,7 +9,7 @@ from common.arrays import FloatArray
 from robot_side.compiled.columns import BUNDLE
 from robot_side.compiled.kernel import BOOL, FLOAT64, INT64, inlined, input_array, output_array, tuple_type
 from robot_side.compiled.vectors import Vector
-from robot_side.overlap.closed_forms.solid import sphere_volume
+from robot_side.overlap.solids.solid import sphere_volume
 
 SPHERE: Final = 0
 BOX: Final = 1

@@ -6,8 +6,8 @@ from typing import Final
 from common.arrays import FloatArray
 from robot_side.compiled.kernel import inlined
 from robot_side.compiled.vectors import Vector, dot, norm, subtract, unit
-from robot_side.overlap.closed_forms.ball import sphere_overlap
-from robot_side.overlap.closed_forms.solid import Overlap
+from robot_side.overlap.solids.ball import sphere_overlap
+from robot_side.overlap.solids.solid import Overlap
 from robot_side.surroundings.kinds.kind import Array, Check, Kind
 from robot_side.surroundings.kinds.layout import ANY_DIRECTION, LEAST_CONTACT_M, NEVER, TOUCHING_M, Contact, Nearest
 

@@ -6,7 +6,7 @@ from typing import Final
 from common.arrays import FloatArray, IntArray
 from robot_side.compiled.kernel import FLOAT64, building_block, compiled, inlined, power_of_two_below
 from robot_side.compiled.vectors import Vector, add, cross, dot, negative, norm, scale, subtract
-from robot_side.overlap.lanes.tetrahedron_lane import tetrahedron_lane
+from robot_side.overlap.solids.tetrahedron_lane import tetrahedron_lane
 from robot_side.surroundings.kinds.convex_contact import convex_contact
 from robot_side.surroundings.kinds.kind import Array, Kind
 from robot_side.surroundings.kinds.layout import (

@@ -7,10 +7,10 @@ import pytest
 
 from common.arrays import FloatArray
 from robot_side.overlap import kernels
-from robot_side.overlap.closed_forms.solid import Overlaps
-from robot_side.overlap.lanes.box_batch import overlap_boxes
-from robot_side.overlap.lanes.lanes import LANES
-from robot_side.overlap.lanes.tetrahedron_batch import overlap_tetrahedra
+from robot_side.overlap.box_batch import overlap_boxes
+from robot_side.overlap.lanes import LANES
+from robot_side.overlap.solids.solid import Overlaps
+from robot_side.overlap.tetrahedron_batch import overlap_tetrahedra
 
 Arrays = tuple[FloatArray, ...]
 Pairs = Callable[..., Overlaps]

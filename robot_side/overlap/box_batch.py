@@ -14,10 +14,9 @@ from robot_side.compiled.kernel import (
     power_of_two_below,
 )
 from robot_side.compiled.vectors import Vector, cross, dot, scale, subtract
+from robot_side.overlap.batch import batch, found_columns
 from robot_side.overlap.checks.arguments import LARGEST, ORTHONORMALITY
-from robot_side.overlap.lanes.batch import batch, found_columns
-from robot_side.overlap.lanes.box_lane import Columns, box_lane
-from robot_side.overlap.lanes.lanes import (
+from robot_side.overlap.lanes import (
     LANES,
     NOTHING,
     PARTIAL,
@@ -33,6 +32,7 @@ from robot_side.overlap.lanes.lanes import (
     vector_column,
     weight,
 )
+from robot_side.overlap.solids.box_lane import Columns, box_lane
 
 # Columns of a block: the pair, then the bounds' verdict, then the result.
 _CENTER, _RADIUS, _BOX_CENTER, _ROTATION, _HALF_SIZES, _INPUTS = 0, 3, 4, 7, 16, 19

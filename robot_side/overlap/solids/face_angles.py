@@ -22,7 +22,7 @@ import math
 
 from robot_side.compiled.kernel import inlined
 from robot_side.overlap.digits.arctangent import arctangent
-from robot_side.overlap.lanes.split_edge import OutsidePart, SplitEdge
+from robot_side.overlap.solids.split_edge import OutsidePart, SplitEdge
 
 Turn = tuple[float, float]
 """Angle as (cosine, sine), both times any positive factor"""

@@ -10,12 +10,12 @@ import math
 
 from robot_side.compiled.kernel import inlined
 from robot_side.compiled.vectors import Vector, add, cross, dot, negative, norm, scale, subtract
-from robot_side.overlap.closed_forms.solid import from_faces
 from robot_side.overlap.digits.double_double import two_sum
 from robot_side.overlap.digits.error_free import determinant, difference, sum_of_products
-from robot_side.overlap.lanes.face_angles import FaceSum, add_edge, edge_terms, face_areas, first_edge
-from robot_side.overlap.lanes.lane_result import LaneResult, settle
-from robot_side.overlap.lanes.split_edge import SplitEdge, split_edge
+from robot_side.overlap.solids.face_angles import FaceSum, add_edge, edge_terms, face_areas, first_edge
+from robot_side.overlap.solids.lane_result import LaneResult, settle
+from robot_side.overlap.solids.solid import from_faces
+from robot_side.overlap.solids.split_edge import SplitEdge, split_edge
 
 Corners = tuple[Vector, Vector, Vector, Vector]
 Shares = tuple[float, float, float, float]

@@ -10,11 +10,11 @@ import math
 
 from robot_side.compiled.kernel import inlined
 from robot_side.compiled.vectors import Vector, add, cross, dot, norm, scale
-from robot_side.overlap.closed_forms.solid import from_faces
 from robot_side.overlap.digits.error_free import difference, sum_of_products
-from robot_side.overlap.lanes.face_angles import add_edge, edge_terms, face_areas, first_edge
-from robot_side.overlap.lanes.lane_result import LaneResult, settle
-from robot_side.overlap.lanes.split_edge import SplitEdge, split_edge
+from robot_side.overlap.solids.face_angles import add_edge, edge_terms, face_areas, first_edge
+from robot_side.overlap.solids.lane_result import LaneResult, settle
+from robot_side.overlap.solids.solid import from_faces
+from robot_side.overlap.solids.split_edge import SplitEdge, split_edge
 
 Columns = tuple[Vector, Vector, Vector]
 

@@ -10,7 +10,7 @@ from common.arrays import FloatArray, IntArray
 from robot_side.compiled.kernel import inlined
 from robot_side.compiled.transpose import transpose_four, transpose_three
 from robot_side.compiled.vectors import Vector
-from robot_side.overlap.closed_forms.solid import Overlap
+from robot_side.overlap.solids.solid import Overlap
 
 LANES = 64
 """Number of pairs in a block: few enough for the columns to stay in the first-level cache"""

@@ -3,7 +3,7 @@
 import math
 
 from robot_side.compiled.kernel import inlined
-from robot_side.overlap.closed_forms.solid import Overlap, sphere_area, sphere_volume
+from robot_side.overlap.solids.solid import Overlap, sphere_area, sphere_volume
 
 LaneResult = tuple[Overlap, float]
 """(overlap, 1 if doubles do not suffice and the pair needs precise forms, else 0)"""

@@ -8,8 +8,7 @@ import numpy as np
 from common.arrays import FloatArray, IntArray
 from robot_side.compiled.kernel import inlined
 from robot_side.compiled.stack import on_stack
-from robot_side.overlap.closed_forms.solid import sphere_area, sphere_volume
-from robot_side.overlap.lanes.lanes import (
+from robot_side.overlap.lanes import (
     LANES,
     NOTHING,
     PARTIAL,
@@ -23,6 +22,7 @@ from robot_side.overlap.lanes.lanes import (
     lane_groups,
     scatter,
 )
+from robot_side.overlap.solids.solid import sphere_area, sphere_volume
 
 Run = Callable[[FloatArray, FloatArray, Any, FloatArray, FloatArray, FloatArray, IntArray], int]
 

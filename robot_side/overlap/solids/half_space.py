@@ -4,8 +4,8 @@ import math
 
 from robot_side.compiled.kernel import building_block, inlined
 from robot_side.compiled.vectors import Vector, scale
-from robot_side.overlap.closed_forms.solid import Overlap, bounded, nothing, whole_sphere
 from robot_side.overlap.digits.double_double import divided, minus, multiple, plus, rounded, square_root, two_product
+from robot_side.overlap.solids.solid import Overlap, bounded, nothing, whole_sphere
 
 
 @building_block

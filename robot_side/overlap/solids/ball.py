@@ -4,8 +4,8 @@ import math
 
 from robot_side.compiled.kernel import building_block
 from robot_side.compiled.vectors import Vector, scale
-from robot_side.overlap.closed_forms.solid import Overlap, bounded, nothing, sphere_volume, whole_solid, whole_sphere
 from robot_side.overlap.digits.double_double import minus, plus, rounded, square_root, times, two_sum
+from robot_side.overlap.solids.solid import Overlap, bounded, nothing, sphere_volume, whole_solid, whole_sphere
 
 
 @building_block

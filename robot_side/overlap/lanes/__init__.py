@@ -1,1 +1,0 @@
-"""Boxes and tetrahedra, 64 pairs at a time in vector instructions."""
