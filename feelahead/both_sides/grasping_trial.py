@@ -76,7 +76,7 @@ class _Silent:
         """Return the field of two free triggers."""
         del situation, now_s
         free = uniform_field(0)
-        return Sensed.of(free, free)
+        return Sensed(l2=free, r2=free)
 
     def around(self, pose: GripperPose) -> Around | None:
         """Return None: there is no map of the surroundings."""

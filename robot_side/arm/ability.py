@@ -16,8 +16,8 @@ _MET = 1e-6
 """Largest deviation of the tool's motion from the commanded motion that counts as none, as a share of full speed"""
 _LEAST_SPEED_M_S = 1e-6
 _LEAST_RATE_RAD_S = 1e-9
-FOUND: Final = 3
-"""Number of values that `find_ability` fills before the joints' rates"""
+_FOUND: Final = 3
+"""Number of values that `_find_ability` fills before the joints' rates"""
 _twist = on_stack(6)
 
 
@@ -61,23 +61,19 @@ def ability(pose: GripperPose, limits: JointLimits, direction: FloatArray, full_
 
     full_speed_m_s: v_max of the settings.
     """
-    found = np.empty(FOUND + limits.velocity_rad_s.size)
+    found = np.empty(_FOUND + limits.velocity_rad_s.size)
     direction = np.ascontiguousarray(direction)
-    usable = find_ability(
+    usable = _find_ability(
         *(pose.tool_jacobian, direction, full_speed_m_s, limits.velocity_rad_s, limits.acceleration_rad_s2, found)
     )
     if not usable:
         refuse(pose.tool_jacobian, full_speed_m_s * direction, limits.velocity_rad_s)
-    speed_m_s, acceleration_m_s2, off_m_s = found[:FOUND].tolist()
+    speed_m_s, acceleration_m_s2, off_m_s = found[:_FOUND].tolist()
     return Ability(speed_m_s, acceleration_m_s2, within_reach=off_m_s <= _MET * full_speed_m_s)
 
 
-ABILITY: Final = (*(input_array(2), input_array(1), FLOAT64, input_array(1), input_array(1), output_array(1)),)
-"""Numba types of the arguments of `find_ability`, which other kernels call by its address."""
-
-
-@compiled(*ABILITY, returns=BOOL)
-def find_ability(
+@compiled(input_array(2), input_array(1), FLOAT64, *(input_array(1),) * 2, output_array(1), returns=BOOL)
+def _find_ability(
     jacobian: FloatArray,
     direction: FloatArray,
     full_speed: float,
@@ -89,7 +85,7 @@ def find_ability(
 
     jacobian (6, n), direction (3,), limits and accelerations (n,). Return False if `resolve` refuses them.
     """
-    twist, rates = _twist(), found[FOUND:]
+    twist, rates = _twist(), found[_FOUND:]
     for i in range(3):
         twist[i], twist[3 + i] = full_speed * direction[i], 0.0
     if not resolve(jacobian, twist, limits, rates):

@@ -1,6 +1,7 @@
 """Errors μ_δ and σ_δ of the predicted delay displacement (eq. 10), by loop age and predicting side."""
 
 import tomllib
+from bisect import bisect_right
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -8,7 +9,6 @@ from typing import Any, Final, get_args
 
 import numpy as np
 
-from common.arrays import FloatArray
 from common.errors import ConfigurationError
 from common.protocol.messages import Compensation
 
@@ -30,32 +30,26 @@ class PredictionErrors:
     arm: str | None = None
     """Fingerprint of the arm on which the errors were measured"""
 
-    def table(self, kind: Compensation) -> FloatArray:
-        """Return the rows (k, 3) for one compensating side; no rows if its errors are unknown."""
-        return np.array(self.rows.get(kind, ()), dtype=np.float64).reshape(-1, 3)
-
     def at(self, kind: Compensation, loop_age_s: float, full_speed_m_s: float) -> tuple[float, float]:
         """Return μ_δ and σ_δ in metres at a loop age, by `prediction_error`."""
-        return prediction_error(self.table(kind), loop_age_s, full_speed_m_s)
+        return prediction_error(self.rows.get(kind, ()), loop_age_s, full_speed_m_s)
 
 
-def prediction_error(rows: FloatArray, loop_age_s: float, full_speed_m_s: float) -> tuple[float, float]:
-    """Return μ_δ and σ_δ in m at a loop age, by linear interpolation between the rows (k, 3).
+def prediction_error(rows: Rows, loop_age_s: float, full_speed_m_s: float) -> tuple[float, float]:
+    """Return μ_δ and σ_δ in m at a loop age, by linear interpolation between the rows.
 
     The first row also holds before it. Beyond the last row, its values grow in proportion to the loop age.
     """
-    count, after = rows.shape[0], 0
-    if count == 0:
+    if not rows:
         return WITHOUT_TABLE * full_speed_m_s * loop_age_s, 0.0
-    while after < count and rows[after, 0] <= loop_age_s:
-        after += 1
-    if after in (0, count):
-        last = max(after - 1, 0)
-        beyond = max(1.0, loop_age_s / rows[last, 0])
-        return beyond * rows[last, 1], beyond * rows[last, 2]
-    share = (loop_age_s - rows[after - 1, 0]) / (rows[after, 0] - rows[after - 1, 0])
-    mean_m, sd_m = rows[after - 1, 1], rows[after - 1, 2]
-    return mean_m + share * (rows[after, 1] - mean_m), sd_m + share * (rows[after, 2] - sd_m)
+    after = bisect_right(rows, loop_age_s, key=lambda row: row[0])
+    age_s, mean_m, sd_m = rows[max(after - 1, 0)]
+    if after in (0, len(rows)):
+        beyond = max(1.0, loop_age_s / age_s)
+        return beyond * mean_m, beyond * sd_m
+    next_s, next_mean_m, next_sd_m = rows[after]
+    share = (loop_age_s - age_s) / (next_s - age_s)
+    return mean_m + share * (next_mean_m - mean_m), sd_m + share * (next_sd_m - sd_m)
 
 
 def load_prediction_errors(path: Path) -> PredictionErrors:

@@ -8,8 +8,9 @@ import numpy as np
 from common.arrays import FloatArray, IntArray, require_finite
 from robot_side.arm.port import GripperPose
 from robot_side.field.along import Along
+from robot_side.field.inflation import DirectionalErrors
 from robot_side.field.look import look
-from robot_side.field.scratch import Error, Scratch
+from robot_side.field.scratch import Scratch
 from robot_side.surroundings.scene_table import SceneTable
 
 _STILL: FloatArray = np.empty(0)
@@ -24,10 +25,15 @@ class Field:
     strength that begins beyond the examined distance has the distance infinity. In the slow list, an object that is to
     be touched has strength 4 at most. Its onset distances are those of its expected position, without the spread
     D_σ(P) - D_σ(0.5)."""
-    sigma_m: float
-    """Largest D_σ of the gripper's spheres"""
+    sigmas_m: FloatArray
+    """(m,) D_σ of each of the gripper's spheres"""
     counts: IntArray
     """Counts of the look's work, indexed by `Count`"""
+
+    @property
+    def sigma_m(self) -> float:
+        """Largest D_σ of the gripper's spheres"""
+        return float(self.sigmas_m.max(initial=0.0))
 
     @property
     def fast_m(self) -> FloatArray:
@@ -73,16 +79,19 @@ class Ahead:
         if not self.scratch.fits(*needed):
             self.scratch = Scratch(*needed)
         scratch = self.scratch
+        errors = DirectionalErrors(
+            along.mean_m, along.variance_m2, along.mean_along_m, along.variance_along_m2, along.quantile
+        )
+        around = widest_m, along.reach_m, classes, approach_m, scene.bundle, scratch.bundle
         found = look(
             *(np.ascontiguousarray(pose.sphere_centers_m), pose.sphere_radii_m, pose.sphere_on_finger),
             *(pose.tool_position_m, np.ascontiguousarray(pose.tool_jacobian), self._encoder_variance),
-            *(along.direction, along.mean_m, along.variance_m2, along.mean_along_m, along.variance_along_m2),
-            *(along.quantile, widest_m, along.reach_m),
-            *(classes, approach_m, scene.bundle, scratch.bundle),
+            *(along.direction, errors, *around),
         )
         if not found:
             _refuse(pose, along)
-        return Field(scratch.distances_m.copy(), float(scratch.along_m[Error.LARGEST]), scratch.counts.copy())
+        sigmas_m = scratch.sigma_m[: len(pose.sphere_radii_m), 0].copy()
+        return Field(scratch.distances_m.copy(), sigmas_m, scratch.counts.copy())
 
 
 def _refuse(pose: GripperPose, along: Along) -> NoReturn:

@@ -5,11 +5,11 @@ the motion, so they only shorten the contact distances (docs/feel.md).
 """
 
 import math
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 from common.arrays import BoolArray, FloatArray
 from robot_side.arm.port import CLUSTER
-from robot_side.compiled.kernel import FLOAT64, compiled, inlined, input_array, output_array
+from robot_side.compiled.kernel import FLOAT64, inlined, tuple_type
 from robot_side.compiled.vectors import Vector, add, cross, dot, load, norm, scale, subtract
 from robot_side.enlargement.distance import statistical_distance
 from robot_side.field.scratch import Error, ScratchColumns
@@ -128,28 +128,5 @@ def around_spheres(spheres: FloatArray, inflated: FloatArray, first: int, end: i
     return middle, radius
 
 
-@compiled(
-    *(input_array(2), input_array(1), input_array(2), input_array(1), input_array(1)),
-    *(FLOAT64, FLOAT64, FLOAT64, FLOAT64, FLOAT64, output_array(1), output_array(1)),
-)
-def explain_inflation(
-    centers: FloatArray,
-    tool: FloatArray,
-    jacobian: FloatArray,
-    encoder_variance: FloatArray,
-    direction: FloatArray,
-    mean: float,
-    variance: float,
-    mean_along: float,
-    variance_along: float,
-    quantile: float,
-    kinematic_variance: FloatArray,
-    distances: FloatArray,
-) -> None:
-    """Fill the variances ûᵀΣû (m,) in m² and D_σ (m,) in m at `centers` (m, 3), as in `inflate`, for explanations."""
-    along = load(direction.reshape(1, 3), 0)
-    spread, origin = spread_along(jacobian, encoder_variance, along), load(tool.reshape(1, 3), 0)
-    for i in range(distances.size):
-        kinematic_variance[i] = variance_at(spread, subtract(load(centers, i), origin))
-        missed = DirectionalErrors(mean, variance, mean_along, variance_along, quantile)
-        _, distances[i] = inflation_and_distance(missed, kinematic_variance[i])
+ERRORS: Final = tuple_type(*(FLOAT64,) * 5, named=DirectionalErrors)
+"""Numba type of `DirectionalErrors`"""

@@ -23,7 +23,7 @@ from robot_side.compiled.kernel import (
     input_indices,
 )
 from robot_side.compiled.vectors import Vector, load
-from robot_side.field.inflation import DirectionalErrors, around_spheres, inflate
+from robot_side.field.inflation import ERRORS, DirectionalErrors, around_spheres, inflate
 from robot_side.field.nearest_first import drop_first, push
 from robot_side.field.object_class import SKIPPED
 from robot_side.field.pairs import enter, pairs_of
@@ -181,14 +181,11 @@ def _key(bound: float, early: float, rough: bool) -> float:
     return bound - early if bound > 0.0 or rough else -math.inf
 
 
-LOOK: Final = (
+@compiled(
     *(input_array(2), input_array(1), input_flags(), input_array(1), input_array(2), input_array(1), input_array(1)),
-    *(FLOAT64, FLOAT64, FLOAT64, FLOAT64, FLOAT64, FLOAT64, FLOAT64, input_indices(), input_array(1), BUNDLE, BUNDLE),
+    *(ERRORS, FLOAT64, FLOAT64, input_indices(), input_array(1), BUNDLE, BUNDLE),
+    returns=BOOL,
 )
-"""Argument types of `look`, for calls by address"""
-
-
-@compiled(*LOOK, returns=BOOL)
 def look(
     centers: FloatArray,
     radii: FloatArray,
@@ -197,11 +194,7 @@ def look(
     jacobian: FloatArray,
     encoder_variance: FloatArray,
     direction: FloatArray,
-    mean: float,
-    variance: float,
-    mean_along: float,
-    variance_along: float,
-    quantile: float,
+    errors: DirectionalErrors,
     half_gap: float,
     reach: float,
     classes: IntArray,
@@ -212,8 +205,8 @@ def look(
     """Fill the scratch's onset distances. Return False for numbers that are not finite: they would compare as far away.
 
     centers (m, 3), radii (m,), on_finger (m,): the gripper's spheres. tool (3,), jacobian (6, n): the tool's.
-    encoder_variance (n,): σ_θ². direction (3,): the unit vector û. mean, variance, mean_along, variance_along,
-    quantile: see `DirectionalErrors`. half_gap: half the gap between the fingers, the largest inflation of a finger's
+    encoder_variance (n,): σ_θ².
+    direction (3,): the unit vector û. half_gap: half the gap between the fingers, the largest inflation of a finger's
     sphere towards the target (§3.4). reach: distance examined. classes (k,): the objects' (`object_class`). early (k,):
     distance by which each object approaches, subtracted from its contact distances; empty if all are at rest.
     """
@@ -221,8 +214,7 @@ def look(
     along, margin, spheres = load(direction.reshape(1, 3), 0), MARGIN_M, radii.size
     scratch.distances_m[:], scratch.counts[:] = math.inf, 0
     origin = load(tool.reshape(1, 3), 0)
-    missed = DirectionalErrors(mean, variance, mean_along, variance_along, quantile)
-    finite = inflate(centers, radii, on_finger, origin, jacobian, encoder_variance, along, missed, scratch)
+    finite = inflate(centers, radii, on_finger, origin, jacobian, encoder_variance, along, errors, scratch)
     if not (finite and math.isfinite(reach)):
         return False
     middle, size = around_spheres(scratch.spheres, scratch.inflation_m, 0, spheres)

@@ -1,17 +1,13 @@
 """Sum of the overlaps of a gripper's spheres with all objects, and the sum for each object (eq. 11-12)."""
 
-import math
-from typing import Final
-
 import numpy as np
 
-from common.arrays import FloatArray, IntArray
+from common.arrays import FloatArray, IntArray, require_finite
 from robot_side.compiled.columns import BUNDLE
 from robot_side.compiled.kernel import FLOAT64, compiled, input_array, input_indices, output_array
-from robot_side.compiled.vectors import add, load
-from robot_side.field.inflation import around_spheres
+from robot_side.compiled.vectors import load
 from robot_side.field.object_class import SKIPPED
-from robot_side.surroundings.bounds import passes
+from robot_side.surroundings.bounds import around, passes
 from robot_side.surroundings.kinds.layout import HALF_SPACE
 from robot_side.surroundings.overlaps import overlap
 from robot_side.surroundings.scene_columns import SCENE, next_object
@@ -29,42 +25,21 @@ def total_overlap_m3(
     classes (k,): the objects'. of_objects_m3 (k,), if given, is filled with the sum for each object that is near; other
     entries stay. ValueError for a sphere that is not finite, because it would compare as far away.
     """
-    still = np.zeros_like(spheres), np.zeros(3)
-    total = sum_overlaps(spheres, *still, classes, scene.bundle, np.empty(3), of_objects_m3)
-    if math.isnan(total):
-        raise ValueError("spheres holds NaN or infinity; valid: finite numbers")
-    return float(total)
+    require_finite("spheres", spheres)
+    return float(_sum_overlaps(spheres, classes, scene.bundle, np.empty(3), of_objects_m3))
 
 
-SUM_OVERLAPS: Final = (
-    *(input_array(2), input_array(2), input_array(1), input_indices(), BUNDLE, output_array(1), output_array(1)),
-)
-"""Argument types of `sum_overlaps`, for calls by address"""
-
-
-@compiled(*SUM_OVERLAPS, returns=FLOAT64)
-def sum_overlaps(
+@compiled(input_array(2), input_indices(), BUNDLE, output_array(1), output_array(1), returns=FLOAT64)
+def _sum_overlaps(
     spheres: FloatArray,
-    inflated: FloatArray,
-    moved: FloatArray,
     classes: IntArray,
     scene_bundle: IntArray,
     overlap_gradient: FloatArray,
     of_objects: FloatArray,
 ) -> float:
-    """Return Σ V_ij in m³ as `total_overlap_m3` does; NaN if a number is not finite.
-
-    inflated (m, 1 or more): its first column is added to the radii. moved (3,): added to all centres. overlap_gradient
-    (3,): scratch.
-    """
-    scene, shift, count = _scene_at(scene_bundle), load(moved.reshape(1, 3), 0), spheres.shape[0]
-    check = shift[0] + shift[1] + shift[2]
-    for i in range(count):
-        check += spheres[i, 0] + spheres[i, 1] + spheres[i, 2] + spheres[i, 3] + inflated[i, 0]
-    if not math.isfinite(check):
-        return math.nan
-    middle, size = around_spheres(spheres, inflated, 0, count)
-    middle, total, nowhere = add(middle, shift), 0.0, (0.0, 0.0, 0.0)
+    """Return Σ V_ij in m³ as `total_overlap_m3` does. overlap_gradient (3,): scratch."""
+    scene, count, total, nowhere = _scene_at(scene_bundle), spheres.shape[0], 0.0, (0.0, 0.0, 0.0)
+    middle, size = around(spheres, 0, count)
     place = next_object(scene, 0, middle, nowhere, 0.0, size)
     while place < scene.object_order.size:
         thing, mine = scene.object_order[place], 0.0
@@ -76,7 +51,7 @@ def sum_overlaps(
             if kind != HALF_SPACE and not passes(middle, nowhere, 0.0, scene.bounds, row, size):
                 continue
             for i in range(count):
-                center, radius = add(load(spheres, i), shift), spheres[i, 3] + inflated[i, 0]
+                center, radius = load(spheres, i), spheres[i, 3]
                 if kind == HALF_SPACE or passes(center, nowhere, 0.0, scene.bounds, row, radius):
                     mine += overlap(
                         kind, scene.kernels, scene.shapes, row, center, radius, scene.meshes, overlap_gradient

@@ -7,43 +7,39 @@ import numpy as np
 from common.arrays import FloatArray, IntArray
 from common.protocol.view_messages import EnlargementTerms
 from robot_side.arm.port import GripperPose
-from robot_side.field.along import Along
-from robot_side.field.inflation import explain_inflation
 from robot_side.field.total_overlap import total_overlap_m3
+from robot_side.laws.prospect import Asked
 from robot_side.surroundings.scene_table import SceneTable
-from robot_side.tick.explained import Overlaps
+from robot_side.tick.explained import Overlaps, TriggerExplained
 from robot_side.tick.situation import Situation
 
 
-def enlargement_terms(
-    situation: Situation,
-    along: Along,
-    encoder_sigma_rad: FloatArray,
-    displacement_m: float,
-) -> tuple[EnlargementTerms, FloatArray]:
-    """Return the terms of eq. 8-10 for the sphere with the largest D_σ, and D_σ of all spheres (m,).
+def explained(
+    situation: Situation, asked: Asked, displacement_m: float, encoder_sigma_rad: FloatArray, scene: SceneTable
+) -> TriggerExplained:
+    """Return the terms of eq. 8-10 for the sphere with the largest D_σ, and the overlaps of the gripper moved by δ.
 
-    encoder_sigma_rad (n,).
+    asked: the look that is explained, from the present pose. displacement_m: δ. encoder_sigma_rad (n,): σ_θ.
     """
-    pose, count = situation.pose, len(situation.pose.sphere_radii_m)
-    kinematic_m2, sigma_m = np.empty(count), np.empty(count)
-    explain_inflation(
-        *(np.ascontiguousarray(pose.sphere_centers_m), pose.tool_position_m, np.ascontiguousarray(pose.tool_jacobian)),
-        *(encoder_sigma_rad**2, along.direction, along.mean_m, along.variance_m2),
-        *(along.mean_along_m, along.variance_along_m2, along.quantile, kinematic_m2, sigma_m),
-    )
-    largest = int(sigma_m.argmax())
+    pose, along = situation.pose, asked.along
+    # ûᵀ J diag(σ_θ²) Jᵀ û of each sphere (eq. 5)
+    kinematic_m2 = np.square(along.direction @ pose.sphere_jacobians) @ np.square(encoder_sigma_rad)
+    variance_m2 = kinematic_m2 + along.variance_m2 + along.variance_along_m2
+    mean_m = along.mean_m + along.mean_along_m
+    sigmas_m = np.maximum(mean_m + along.quantile * np.sqrt(variance_m2), 0.0)
+    largest = int(sigmas_m.argmax())
     terms = EnlargementTerms(
-        sigma_m=float(sigma_m[largest]),
-        mean_m=float(along.mean_m + along.mean_along_m),
-        kinematic_sd_m=float(np.sqrt(kinematic_m2[largest])),
+        sigma_m=float(sigmas_m[largest]),
+        mean_m=float(mean_m),
+        kinematic_sd_m=math.sqrt(kinematic_m2[largest]),
         camera_sd_m=math.sqrt(along.variance_m2),
         prediction_sd_m=math.sqrt(along.variance_along_m2),
         quantile=along.quantile,
-        loop_age_s=float(situation.loop_age_s),
-        displacement_m=float(displacement_m),
+        loop_age_s=situation.loop_age_s,
+        displacement_m=displacement_m,
     )
-    return terms, sigma_m
+    spheres = moved_and_inflated(pose, displacement_m * along.direction, sigmas_m)
+    return TriggerExplained(terms, overlaps_by_object(spheres, scene, asked.classes))
 
 
 def overlaps_by_object(spheres: FloatArray, scene: SceneTable, classes: IntArray) -> Overlaps:

@@ -1,11 +1,19 @@
 """Interface of every law: once a tick it computes two trigger fields and a rumble from a situation."""
 
-from typing import Protocol
+import math
+from typing import Final, Protocol
 
+import numpy as np
+
+from common.arrays import require_finite
 from common.protocol.around import Around
 from robot_side.arm.port import GripperPose
 from robot_side.tick.sensed import Sensed
 from robot_side.tick.situation import Situation
+
+MOST_M: Final = 100.0
+"""Largest distance (m) or speed (m/s) in a message; larger ones are cut to it. An unstable simulation would exceed it,
+and must still report."""
 
 
 class Law(Protocol):
@@ -25,3 +33,30 @@ class Law(Protocol):
     def summary(self) -> dict[str, int]:
         """Return counts of the law's work over the run, for the run's summary."""
         ...
+
+
+def require_usable(situation: Situation, joints: int, now_s: float) -> None:
+    """Raise a ValueError that names what is not finite or has the wrong size: NaN would compare as far away.
+
+    joints: the number n for which the law was made.
+    """
+    pose, rates = situation.pose, situation.joint_velocities_rad_s
+    spheres = len(pose.sphere_radii_m)
+    for name, count, valid in (
+        ("joint_velocities_rad_s", len(rates), joints),
+        ("pose.tool_jacobian's columns", pose.tool_jacobian.shape[1], joints),
+        ("pose.sphere_centers_m", len(pose.sphere_centers_m), spheres),
+        ("pose.sphere_on_finger", len(pose.sphere_on_finger), spheres),
+    ):
+        if count != valid:
+            raise ValueError(f"{name} = {count}; valid: {valid}, the number that the law was made for")
+    # One sum is not finite if any of its numbers is not, and is quicker than to look at each.
+    numbers = pose.tool_jacobian.sum() + pose.sphere_centers_m.sum() + pose.sphere_radii_m.sum() + rates.sum()
+    numbers += pose.tool_position_m.sum() + pose.tool_rotation.sum() + sum(situation.lateral)
+    if math.isfinite(numbers + situation.loop_age_s + now_s):
+        return
+    for name in ("tool_position_m", "tool_rotation", "tool_jacobian", "sphere_centers_m", "sphere_radii_m"):
+        require_finite(f"pose.{name}", getattr(pose, name))
+    require_finite("joint_velocities_rad_s", rates)
+    for name, values in (("loop_age_s", situation.loop_age_s), ("lateral", situation.lateral), ("now_s", now_s)):
+        require_finite(name, np.atleast_1d(np.array(values)))

@@ -1,162 +1,137 @@
-"""Schedule of looks: in each tick the look that has waited longest is made first.
-
-A look evaluates the law along one side from one place. Sides are R2, L2, and the stick while it is deflected. Places
-are the gripper's present pose, and the poses to which it will have drifted, turned or closed its fingers. A tick has at
-most one look; two once a look is 1.5 periods old; and all that are due once one is 5 periods old, or if a place is new.
-A tick that measures the motion has none, unless a look is 1.5 periods old.
-"""
+"""Looks of one turn: along each side from the present pose, from waypoints on the path, and from the map's probes."""
 
 import math
-from typing import Final, NamedTuple
+from dataclasses import dataclass, field
+from typing import Final
 
-from common.arrays import BoolArray, FloatArray, IntArray
-from robot_side.compiled.calls import call_at_address
-from robot_side.compiled.kernel import BOOL, FLOAT64, building_block, inlined
-from robot_side.compiled.vectors import Vector, dot, load
-from robot_side.field.look import LOOK
-from robot_side.field.scratch import SCRATCH, Count, Error
-from robot_side.field.total_overlap import SUM_OVERLAPS
-from robot_side.laws.around import FIRST_PROBE, go_to_probe, keep_probe, probe_waiting
-from robot_side.laws.felt import MOST_M
-from robot_side.laws.memory import Kernel, Total, memory_at
-from robot_side.laws.path import go_to
-from robot_side.laws.prospect import FIND_PROSPECT, stopping
-from robot_side.laws.recent_looks import keep, longest_waiting
-from robot_side.tick.sensed import L2, R2
+import numpy as np
 
-OVERLAP_PERIOD_S: Final = 0.02
+from common.arrays import FloatArray, IntArray
+from common.protocol.around import PROBES
+from robot_side.field.field import Ahead, Field
+from robot_side.field.scratch import Count
+from robot_side.field.total_overlap import total_overlap_m3
+from robot_side.laws.around import ProbeLooks, probe
+from robot_side.laws.classes import Classes
+from robot_side.laws.explanation import moved_and_inflated
+from robot_side.laws.gripper_motion import GripperMotion
+from robot_side.laws.path import Drift, Waypoint, times_ahead_s, waypoints
+from robot_side.laws.prospect import Assumed, Prospect, prospect, stopping_s
+from robot_side.laws.recent_looks import Newest, RecentLooks
+from robot_side.surroundings.scene_table import SceneTable
+from robot_side.tick.sensed import L2, R2, STICK
+from robot_side.tick.situation import Situation
+
+_OVERLAP_PERIOD_S: Final = 0.02
 """Period at which the overlap at δ is computed; this figure is for display only"""
-ROUNDING_S: Final = 1e-9
-_ROUNDING: Final = 1e-6
-_OVERDUE: Final = 1.5
-"""Age of a side's look from a place, in periods, from which a tick has two looks"""
-_FAR_BEHIND: Final = 5.0
-"""Age of a side's look from a place, in periods, from which a tick has all looks that are due. A place without a look
-counts as infinitely old."""
-_ALL: Final = 1000
-
-scratch_at = SCRATCH.at
-_find_prospect = call_at_address(BOOL, FIND_PROSPECT)
-_look = call_at_address(BOOL, LOOK)
-_sum_overlaps = call_at_address(FLOAT64, SUM_OVERLAPS)
+_ROUNDING_S: Final = 1e-9
+_NOTHING: Final[FloatArray] = np.zeros(3)
 
 
-class Moment(NamedTuple):
-    """Input of the law's kernel in one tick: the gripper, the link and the scene."""
+@dataclass(frozen=True)
+class Seen:
+    """What one turn looks at: the situation, and what was worked out of it."""
 
-    rotation: FloatArray
-    jacobian: FloatArray
-    centers: FloatArray
-    radii: FloatArray
-    on_finger: BoolArray
-    tool: Vector
-    approach: Vector
-    speed: float
-    """Tool's speed along its approach axis, m/s"""
-    now: float
-    loop_age: float
-    by_operator: bool
-    """Whether the operator side predicts δ"""
-    half_gap: float
-    """Half the gap between the fingers, m (§3.4)"""
-    right: float
-    up: float
-    """Deflection of the stick that moves across: `right` and `up`"""
-    classes: IntArray
-    closing: IntArray
-    """Classes of the objects while the fingers move: the target is SKIPPED, because the fingers shall touch it."""
-    velocities: FloatArray
-    """Velocities of the objects (k, 3); empty if unknown, and then all objects count as at rest"""
-    scene: IntArray
-    scratch: IntArray
+    situation: Situation
+    motion: GripperMotion
+    assumed: Assumed
+    classes: Classes
+    scene: SceneTable
+    now_s: float
+    passed_s: float
+    """Time since the last turn that looked; infinite in the first"""
+
+    def prospect(self, side: int, waypoint: Waypoint | None = None) -> Prospect:
+        """Return the prospect of a look along one side; without a waypoint, from the present pose."""
+        closes = waypoint is not None and self.motion.fingers_m_s is not None
+        classes = self.classes.closing if closes else self.classes.usual
+        return prospect(side, self.situation, self.motion.ahead_m_s, classes, self.assumed, waypoint)
 
 
-@inlined
-def _fill_early(bundle: IntArray, velocities: FloatArray, stopping: float) -> None:
-    """Fill the distance by which each object approaches in `stopping` seconds, until the arm stands.
+@dataclass
+class Looking:
+    """Maker of the looks, with the recent ones along each side."""
 
-    A look shortens the object's contact distances by it.
-    """
-    memory = memory_at(bundle)
-    along = load(memory.direction.reshape(1, 3), 0)
-    for thing in range(velocities.shape[0]):
-        memory.approach_m[thing] = min(max(-dot(load(velocities, thing), along), 0.0) * stopping, MOST_M)
+    ahead: Ahead
+    probes: ProbeLooks | None
+    """Looks for the map; None if nobody asks for it"""
+    sides: tuple[RecentLooks, ...] = field(default_factory=lambda: tuple(RecentLooks() for _ in (R2, L2, STICK)))
+    newest: dict[int, Newest] = field(default_factory=dict)
+    """Newest look along each side from the present pose"""
+    overlap_m3: float = 0.0
+    """Newest Σ V_ij at δ along the side that leads"""
+    looks: int = 0
+    with_nothing_near: int = 0
+    """Looks in which no sphere touched an object within the examined distance"""
+    work: IntArray = field(default_factory=lambda: np.zeros(len(Count), dtype=np.int64))
+    """Counts of the looks' work, indexed by `Count`"""
+    _next_overlap_s: float = -math.inf
 
+    def turn(self, seen: Seen, *, changed: bool) -> None:
+        """Make the looks of one turn. changed: whether objects or the gripper's spheres have changed or moved."""
+        situation, motion = seen.situation, seen.motion
+        deflected, traced = situation.lateral != (0.0, 0.0), situation.compensation == "operator"
+        for side in (R2, L2, STICK)[: 3 if deflected else 2]:
+            self._look_from_here(side, seen)
+        if not deflected:
+            self.sides[STICK].forget()
+        until_s = stopping_s(self.newest[R2].able, situation.loop_age_s)
+        # The operator side traces the sticks' motion through the map; then only the fingers' is looked along.
+        on_map = traced and self.probes is not None and self.probes.known
+        self._look_from_waypoints(seen, until_s, traced=on_map)
+        if self.probes is not None:
+            self.probes.turn(until_s, seen.now_s, traced=traced, moved=changed or motion.moves)
+            self._look_from_probes(self.probes, self.probes.due(motion, seen.passed_s), seen)
 
-@building_block
-def _look_along(bundle: IntArray, moment: Moment, side: int, place: int) -> bool:
-    """Look along one side from one place or probe and keep the result. Return False for numbers that are not finite."""
-    memory = memory_at(bundle)
-    state, prospect, count = memory.state[0], memory.prospect[0], moment.radii.size
-    there = moment.tool, moment.rotation, moment.centers, side
-    probe = place - FIRST_PROBE
-    if probe >= 0:
-        gone = go_to_probe(bundle, *there, probe, moment.speed, moment.loop_age)
-    else:
-        gone = go_to(bundle, *there, place, moment.speed, moment.loop_age)
-    where = memory.rotation, moment.jacobian, moment.right, moment.up, moment.loop_age, moment.by_operator
-    if not _find_prospect(memory.kernels[Kernel.PROSPECT], (bundle, side, *where, gone)):
-        return False
-    _fill_early(bundle, moment.velocities, stopping(prospect.speed, prospect.acceleration, moment.loop_age))
-    classes = moment.closing if place > 0 and state.moves_fingers == 1 else moment.classes
-    gripper = memory.centers_m[:count], moment.radii, moment.on_finger, memory.tool_m, moment.jacobian
-    settings = memory.settings[0]
-    errors = memory.encoder_variance, memory.direction, prospect.mean, settings.camera_variance
-    along = prospect.mean_along, prospect.variance_along, settings.quantile
-    early = memory.approach_m[: moment.velocities.shape[0]]
-    around = moment.half_gap, prospect.reach, classes, early, moment.scene, moment.scratch
-    if not _look(memory.kernels[Kernel.LOOK], (*gripper, *errors, *along, *around)):
-        return False
-    scratch, totals = scratch_at(moment.scratch), memory.totals
-    for counted in range(scratch.counts.size):
-        totals[counted] += scratch.counts[counted]
-    totals[Total.LOOKS] += 1
-    totals[Total.WITH_NOTHING_NEAR] += 1 if scratch.counts[Count.PAIRS] == 0 else 0
-    if probe >= 0:
-        keep_probe(bundle, side, probe, moment.now, moment.tool, scratch.distances_m)
-        return True
-    leads = place == 0 and side == (R2 if moment.speed >= 0.0 else L2)
-    if leads and moment.now >= state.next_overlap:
-        state.next_overlap = moment.now + OVERLAP_PERIOD_S - ROUNDING_S
-        for axis in range(3):
-            memory.displacement_m[axis] = abs(moment.speed) * moment.loop_age * memory.direction[axis]
-        spheres = scratch.spheres[:count], scratch.sigma_m[:count], memory.displacement_m
-        state.overlap = _sum_overlaps(
-            memory.kernels[Kernel.OVERLAPS], (*spheres, classes, moment.scene, memory.overlap_gradient, memory.nothing)
-        )
-    keep(bundle, side, place, moment.now, moment.tool, scratch.distances_m)
-    if place == 0:
-        newest = memory.newest[side]
-        newest.reach, newest.speed, newest.acceleration = prospect.reach, prospect.speed, prospect.acceleration
-        newest.sigma, newest.overlap = scratch.along_m[Error.LARGEST], state.overlap if leads else 0.0
-    return True
+    def look_around(self, seen: Seen) -> None:
+        """Look from all probes."""
+        if self.probes is not None:
+            until_s = stopping_s(seen.prospect(R2).able, seen.situation.loop_age_s)
+            self.probes.turn(until_s, seen.now_s, traced=True, moved=True)
+            self._look_from_probes(self.probes, [(side, one) for side in (R2, L2) for one in range(PROBES)], seen)
 
+    def _look_from_probes(self, probes: ProbeLooks, due: list[tuple[int, int]], seen: Seen) -> None:
+        for side, number in due:
+            there = probe(number, seen.situation.pose, seen.assumed.motion, probes.full_s)
+            probes.add(side, number, *self._look(seen.prospect(side, there), seen)[1:])
 
-@inlined
-def look_at_due(bundle: IntArray, moment: Moment, at_most: int) -> bool:
-    """Make up to `at_most` due looks, those that have waited longest first; more if one has waited too long.
+    def _look(self, found: Prospect, seen: Seen) -> tuple[Field, FloatArray, float, FloatArray]:
+        """Look; return the field, û, the tool's position along û, and the onset distances (2, 8) from the tool."""
+        pose, classes, along, widest_m = found.asked
+        made = self.ahead.look(pose, seen.scene, classes, along, widest_m)
+        self.work += made.counts
+        self.looks += 1
+        self.with_nothing_near += int(made.counts[Count.PAIRS] == 0)
+        direction = found.asked.along.direction
+        began_m = float(direction @ seen.situation.pose.tool_position_m)
+        return made, direction, began_m, found.from_tool_m(made.onsets_m)
 
-    at_most is 0 in a tick that measures the motion. A due probe waits for a tick that neither measures the motion nor
-    has another look; an overdue probe does not wait. Return False for numbers that are not finite.
-    """
-    busy = at_most == 0
-    waited, side, place = longest_waiting(bundle, moment.now)
-    if waited >= _FAR_BEHIND:
-        at_most = _ALL
-    elif waited >= _OVERDUE:
-        at_most = 2
-    while at_most > 0 and waited >= 1.0 - _ROUNDING:
-        if not _look_along(bundle, moment, side, place):
-            return False
-        at_most, busy = at_most - 1, True
-        waited, side, place = longest_waiting(bundle, moment.now)
-    of_probe, side, place = probe_waiting(bundle, moment.now, moment.speed)
-    due = _OVERDUE if busy else 1.0 - _ROUNDING
-    while of_probe >= due:
-        # After the first probe, only probes that have no look yet.
-        due = math.inf
-        if not _look_along(bundle, moment, side, place):
-            return False
-        of_probe, side, place = probe_waiting(bundle, moment.now, moment.speed)
-    memory_at(bundle).state[0].next = moment.now if max(waited, of_probe) >= 1.0 - _ROUNDING else math.inf
-    return True
+    def _look_from_here(self, side: int, seen: Seen) -> None:
+        found, motion = seen.prospect(side), seen.motion
+        made, direction, began_m, onsets_m = self._look(found, seen)
+        self.sides[side].add(0, seen.now_s, direction, began_m, onsets_m)
+        self.newest[side] = Newest(direction, began_m, found.asked.along.reach_m, found.able, made.sigma_m)
+        leads = side == (R2 if motion.ahead_m_s >= 0.0 else L2)
+        if leads and seen.now_s >= self._next_overlap_s:
+            self._next_overlap_s = seen.now_s + _OVERLAP_PERIOD_S - _ROUNDING_S
+            displacement_m = abs(motion.ahead_m_s) * seen.situation.loop_age_s * direction
+            spheres = moved_and_inflated(seen.situation.pose, displacement_m, made.sigmas_m)
+            self.overlap_m3 = total_overlap_m3(spheres, seen.scene, found.asked.classes)
+
+    def _look_from_waypoints(self, seen: Seen, until_s: float, *, traced: bool) -> None:
+        """Look along R2 and L2 from the waypoints on the gripper's path that are new, or whose turn it is."""
+        pose, motion, times_s = seen.situation.pose, seen.motion, tuple[float, ...]()
+        drift = Drift(_NOTHING, _NOTHING, motion.fingers_m_s)
+        if not traced:
+            aside_m_s = motion.linear_m_s - motion.ahead_m_s * pose.tool_rotation[:, 2]
+            drift = Drift(aside_m_s, motion.turning_rad_s, motion.fingers_m_s)
+        if motion.moves and not (traced and motion.fingers_m_s is None):
+            times_s = times_ahead_s(pose, drift, until_s, until_s * self.newest[R2].able.full_speed_m_s)
+        for side in (R2, L2):
+            looks = self.sides[side]
+            if times_s or looks.waypoints:
+                ahead = waypoints(drift, times_s, looks.nearest(len(times_s)))
+                looks.keep_up_to(len(ahead))
+                for number in looks.due(seen.passed_s, seen.now_s):
+                    found = seen.prospect(side, ahead[number - 1])
+                    looks.add(number, seen.now_s, *self._look(found, seen)[1:])

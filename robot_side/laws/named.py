@@ -23,9 +23,7 @@ LawName = Literal["swept", "paper"]
 def _swept(*arguments: Any) -> NamedLaw:
     from robot_side.laws.swept import SweptLaw  # noqa: PLC0415
 
-    law = SweptLaw(*arguments)
-    law.ask_around(asked=law.fits_a_message)
-    return law
+    return SweptLaw(*arguments, maps=True)
 
 
 def _paper(*arguments: Any) -> NamedLaw:

@@ -116,9 +116,9 @@ class PaperLaw:
         able = along_approach(pose, self._limits, self._motion.trigger_speed_m_s)
         felt = uniform_field(round(STRENGTHS * stiffness), able.full_speed_m_s, able.acceleration_m_s2)
         velocity_m_s = pose.tool_jacobian[:3] @ situation.joint_velocities_rad_s
-        return Sensed.of(
-            felt,
-            felt,
+        return Sensed(
+            l2=felt,
+            r2=felt,
             speed_m_s=float(pose.tool_rotation[:, 2] @ velocity_m_s),
             tool_speed_m_s=float(np.linalg.norm(velocity_m_s)),
             horizon_m=FAR_M,

@@ -1,4 +1,4 @@
-"""Predicted path of the gripper until the arm stands, and places on the path from which looks are made.
+"""Predicted path of the gripper until the arm stands, and waypoints on it from which looks are made.
 
 Sticks move and turn the tool in the tool's own frame, at the velocities v and ω, so the tool makes a screw motion.
 After the time t the tool has turned by θ = |ω| t, and the sticks have displaced its point by
@@ -7,165 +7,131 @@ After the time t the tool has turned by θ = |ω| t, and the sticks have displac
 
 (exponential map of SE(3)). The trigger moves the tool along its approach axis z, which turns too. So the trigger
 displaces it along the chord V z. Where the turn is across z, the chord points along z turned by θ/2. Fingers add their
-own motion to their spheres. Onset distances from a place include the distance that commands under way will have moved
-the tool by then.
+own motion to their spheres. Onset distances from a waypoint include the distance that commands under way will have
+moved the tool by then.
 """
 
 import math
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Final
 
-from common.arrays import FloatArray, IntArray
-from robot_side.compiled.columns import BUNDLE
-from robot_side.compiled.kernel import FLOAT64, INT64, compiled, inlined, input_array
-from robot_side.compiled.vectors import Vector, add, cross, load, norm, scale, subtract, unit
-from robot_side.laws.memory import EVEN_PLACES, memory_at
-from robot_side.tick.sensed import L2
+import numpy as np
+
+from common.arrays import FloatArray
+from robot_side.arm.port import GripperPose
 
 SPACING_M: Final = 0.015
-"""Largest motion of any sphere between two places: less than the width of an inflated fingertip's sphere. On a path
-that would need more than EVEN_PLACES, places are farther apart."""
+"""Largest motion of any sphere between two waypoints: less than the width of an inflated fingertip's sphere. On a path
+that would need more than EVEN_WAYPOINTS, they are farther apart."""
+EVEN_WAYPOINTS: Final = 8
+"""Maximum number of waypoints at equal intervals of time"""
 _LEAST_M: Final = 0.003
-"""Largest motion of any sphere up to which the path has no places ahead"""
+"""Largest motion of any sphere up to which the path has no waypoints"""
+_STRAIGHT: Final = np.eye(3)
 
 
-@inlined
-def fastest_m_s(bundle: IntArray, centers: FloatArray, tool: Vector, ahead: Vector) -> float:
-    """Return the largest speed |v + ω × r + own| of all spheres in m/s; NaN if any is not finite.
+@dataclass(frozen=True)
+class Drift:
+    """Motion of the gripper besides the trigger's, in the world frame."""
 
-    Each sphere counts at its present position r from the tool, and as if it were displaced by `ahead`.
+    linear_m_s: FloatArray
+    """(3,) velocity of the tool's point"""
+    turning_rad_s: FloatArray
+    """(3,) angular velocity of the tool"""
+    fingers_m_s: FloatArray | None = None
+    """(m, 3) velocity of each sphere relative to the tool; None while the fingers rest"""
+
+
+@dataclass(frozen=True)
+class Waypoint:
+    """Pose to which a drift takes the gripper, and from which looks along the triggers are made."""
+
+    drift: Drift
+    after_s: float
+    """Time until the gripper is there"""
+    moved_s: float
+    """Time for which the trigger moves it until then: half a step less, as the look counts for the path from there"""
+
+
+def fastest_m_s(pose: GripperPose, drift: Drift, ahead_m: float) -> float:
+    """Return the largest speed |v + ω × r + own| of all spheres in m/s.
+
+    Each sphere counts at its present position r from the tool, and as if it were displaced by `ahead_m` along the
+    approach axis: in a turn, points farther ahead move faster.
     """
-    memory = memory_at(bundle)
-    velocity, turning = load(memory.velocity, 0), load(memory.velocity, 1)
-    fastest, check = 0.0, 0.0
-    for i in range(centers.shape[0]):
-        lever, alone = subtract(load(centers, i), tool), add(velocity, load(memory.own_m_s, i))
-        near, far = norm(add(alone, cross(turning, lever))), norm(add(alone, cross(turning, add(lever, ahead))))
-        fastest = max(fastest, near, far)
-        # max() may hide NaN; the sum does not.
-        check += near + far
-    return fastest if math.isfinite(check) else math.nan
+    alone = drift.linear_m_s if drift.fingers_m_s is None else drift.linear_m_s + drift.fingers_m_s
+    turned = _cross(drift.turning_rad_s).T
+    here = alone + (pose.sphere_centers_m - pose.tool_position_m) @ turned
+    there = here + ahead_m * (pose.tool_rotation[:, 2] @ turned)
+    squares = np.maximum(np.einsum("mi,mi->m", here, here), np.einsum("mi,mi->m", there, there))
+    return math.sqrt(float(squares.max(initial=0.0)))
 
 
-@inlined
-def plan_places(
-    bundle: IntArray, centers: FloatArray, tool: Vector, approach: Vector, until: float, ahead: float
-) -> None:
-    """Choose the times of the even places on the path; the last is `until`. A gripper at rest gets no such places.
+def times_ahead_s(pose: GripperPose, drift: Drift, until_s: float, ahead_m: float) -> tuple[float, ...]:
+    """Return the times until the gripper is at the even waypoints on its path; the last is `until_s`. None at rest.
 
-    ahead: distance (m) along the approach axis at which the places must be as close together as at the gripper. In a
-    turn, points farther ahead move faster.
+    ahead_m: distance along the approach axis at which the waypoints must be as close together as at the gripper.
     """
-    memory = memory_at(bundle)
-    state, farthest = memory.state[0], until * fastest_m_s(bundle, centers, tool, scale(ahead, approach))
-    state.even_places = 0
-    if farthest >= _LEAST_M and math.isfinite(farthest):
-        state.even_places = min(math.ceil(farthest / SPACING_M), EVEN_PLACES)
-    for number in range(state.even_places):
-        memory.moments_s[number] = until * (number + 1) / state.even_places
+    farthest_m = until_s * fastest_m_s(pose, drift, ahead_m)
+    if farthest_m < _LEAST_M:
+        return ()
+    count = min(math.ceil(farthest_m / SPACING_M), EVEN_WAYPOINTS)
+    return tuple(until_s * (number + 1) / count for number in range(count))
 
 
-@inlined
-def time_of_place(bundle: IntArray, side: int, place: int) -> float:
-    """Return the time in s until the gripper is at a place.
+def waypoints(drift: Drift, times_s: Sequence[float], nearest: int) -> list[Waypoint]:
+    """Return the even waypoints, and two more, half a step before and after the one that is nearest to an object.
 
-    The last two places lie half a step before and after the place with the shortest onset distance of full strength.
+    nearest: 0 for the present pose, 1 for the first even waypoint. A nearer object may lie between two of them.
     """
-    memory = memory_at(bundle)
-    even = memory.state[0].even_places
-    if place <= even:
-        after: float = memory.moments_s[place - 1] if place > 0 else 0.0
-        return after
-    nearest = 0
-    for one in range(1, even + 1):
-        if memory.nearest_m[side, one] < memory.nearest_m[side, nearest]:
-            nearest = one
-    half_steps = 2.0 * nearest + (1.0 if place == even + 1 else -1.0)
-    between: float = 0.5 * memory.moments_s[0] * min(max(half_steps, 1.0), 2.0 * even - 1.0)
-    return between
+    if not times_s:
+        return []
+    half_s = 0.5 * times_s[0]
+    beside = (min(max(2.0 * nearest + side, 1.0), 2.0 * len(times_s) - 1.0) for side in (-1.0, 1.0))
+    return [Waypoint(drift, after_s, after_s - half_s) for after_s in (*times_s, *(half_s * one for one in beside))]
 
 
-@inlined
-def _along_screw(vector: Vector, axis: Vector, across: float, twice: float) -> Vector:
-    """Return v + across · a × v + twice · a × (a × v), with a = `axis`. Rotations (Rodrigues) and V have this form."""
-    turned = cross(axis, vector)
-    return add(vector, add(scale(across, turned), scale(twice, cross(axis, turned))))
+def at_waypoint(pose: GripperPose, waypoint: Waypoint, ahead_m: float) -> tuple[GripperPose, FloatArray]:
+    """Return the gripper's pose at a waypoint, and the chord (3,): the tool's displacement per metre by the trigger.
 
-
-@inlined
-def move(
-    bundle: IntArray,
-    origin: Vector,
-    rotation: FloatArray,
-    centers: FloatArray,
-    linear: Vector,
-    turning: Vector,
-    after: float,
-    ahead: float,
-) -> None:
-    """Fill the memory with the pose of tool and spheres in `after` seconds, and with the chord of the trigger's path.
-
-    origin, rotation (3, 3), centers (m, 3): the present pose; `after` = 0 copies it without rounding. linear, turning:
-    velocities of the tool without the trigger's part (m/s, rad/s). ahead: distance (m) along the approach axis that
-    the trigger moves the tool by then.
+    ahead_m: distance along the approach axis by which the trigger has moved the tool until then.
     """
-    memory = memory_at(bundle)
-    stays, axis, angle = after == 0.0, unit(turning), after * norm(turning)
-    sine, versine = math.sin(angle), 2.0 * math.sin(0.5 * angle) ** 2
-    across, twice = (versine / angle, 1.0 - sine / angle) if angle > 1e-9 else (0.5 * angle, 0.0)
-    chord = _along_screw((rotation[0, 2], rotation[1, 2], rotation[2, 2]), axis, across, twice)
-    moved = origin
-    if not stays:
-        sideways = _along_screw(scale(after, linear), axis, across, twice)
-        moved = add(origin, add(sideways, scale(ahead, chord)))
-    for k in range(3):
-        memory.tool_m[k], memory.chord[k] = moved[k], chord[k]
-        column = _along_screw((rotation[0, k], rotation[1, k], rotation[2, k]), axis, sine, versine)
-        for row in range(3):
-            memory.rotation[row, k] = column[row]
-    for i in range(centers.shape[0]):
-        center = load(centers, i)
-        if not stays:
-            lever = subtract(add(center, scale(after, load(memory.own_m_s, i))), origin)
-            center = add(moved, _along_screw(lever, axis, sine, versine))
-        for row in range(3):
-            memory.centers_m[i, row] = center[row]
+    drift, after_s = waypoint.drift, waypoint.after_s
+    turn, screw = _screw(drift.turning_rad_s, after_s)
+    chord = screw @ pose.tool_rotation[:, 2]
+    tool_m = pose.tool_position_m + after_s * (screw @ drift.linear_m_s) + ahead_m * chord
+    levers_m = pose.sphere_centers_m - pose.tool_position_m
+    if drift.fingers_m_s is not None:
+        levers_m = levers_m + after_s * drift.fingers_m_s
+    return (
+        GripperPose(
+            tool_position_m=tool_m,
+            tool_rotation=turn @ pose.tool_rotation,
+            tool_jacobian=pose.tool_jacobian,
+            sphere_centers_m=tool_m + levers_m @ turn.T,
+            sphere_radii_m=pose.sphere_radii_m,
+            sphere_on_finger=pose.sphere_on_finger,
+        ),
+        chord,
+    )
 
 
-@inlined
-def go_to(
-    bundle: IntArray,
-    tool: Vector,
-    rotation: FloatArray,
-    centers: FloatArray,
-    side: int,
-    place: int,
-    speed: float,
-    loop_age: float,
-) -> float:
-    """Fill the memory with the gripper's pose at a place of one side; place 0 is the present pose.
-
-    Return the distance (m) that the trigger has moved the gripper by then: at `speed`, along the approach axis, for at
-    most the loop age, as commands under way last no longer. It is taken half a step before the place, because a place
-    represents the path from there on.
-    """
-    memory, after = memory_at(bundle), time_of_place(bundle, side, place)
-    forth, since = 1.0 if side != L2 else -1.0, max(after - 0.5 * memory.moments_s[0], 0.0)
-    gone: float = max(forth * speed, 0.0) * min(since, loop_age)
-    velocity = load(memory.velocity, 0), load(memory.velocity, 1)
-    move(bundle, tool, rotation, centers, *velocity, after, forth * gone)
-    return gone
+def _screw(turning_rad_s: FloatArray, after_s: float) -> tuple[FloatArray, FloatArray]:
+    """Return the rotation (3, 3) after a time, and V (3, 3)."""
+    rate = math.sqrt(float(turning_rad_s @ turning_rad_s))
+    angle = rate * after_s
+    if angle <= 1e-9:
+        return _STRAIGHT, _STRAIGHT
+    axis = _cross(turning_rad_s / rate)
+    twice, versine = axis @ axis, 2.0 * math.sin(0.5 * angle) ** 2
+    return (
+        _STRAIGHT + math.sin(angle) * axis + versine * twice,
+        _STRAIGHT + (versine / angle) * axis + (1.0 - math.sin(angle) / angle) * twice,
+    )
 
 
-@compiled(BUNDLE, input_array(1), input_array(2), input_array(2), INT64, INT64, FLOAT64, FLOAT64, returns=FLOAT64)
-def go_to_place(
-    bundle: IntArray,
-    tool: FloatArray,
-    rotation: FloatArray,
-    centers: FloatArray,
-    side: int,
-    place: int,
-    speed: float,
-    loop_age: float,
-) -> float:
-    """Do the same as `go_to`, as a kernel that Python can call. bundle: the memory's. tool (3,): position."""
-    return go_to(bundle, load(tool.reshape(1, 3), 0), rotation, centers, side, place, speed, loop_age)
+def _cross(vector: FloatArray) -> FloatArray:
+    """Return the matrix [v] (3, 3) with [v] w = v × w."""
+    x, y, z = vector.tolist()
+    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])

@@ -1,91 +1,127 @@
-"""Parameters of a look along one side: direction, the arm's speed and acceleration in it, and errors (eq. 9-10)."""
+"""Prospect of a look along one direction: what is asked of it, by the errors (eq. 9-10) and the arm's ability."""
 
 import math
-from typing import Final
+from dataclasses import dataclass
+from typing import Final, NamedTuple
+
+import numpy as np
 
 from common.arrays import FloatArray, IntArray
 from common.reaction import HORIZON_S
-from robot_side.arm.ability import ABILITY
-from robot_side.compiled.calls import call_at_address
-from robot_side.compiled.columns import BUNDLE
-from robot_side.compiled.kernel import BOOL, FLOAT64, INT64, compiled, inlined, input_array
-from robot_side.compiled.vectors import load, norm
-from robot_side.enlargement.prediction_errors import prediction_error
-from robot_side.laws.memory import Kernel, memory_at
+from robot_side.arm.ability import Ability, JointLimits, ability
+from robot_side.arm.port import GripperPose
+from robot_side.arm.tool_motion import ToolMotionSettings
+from robot_side.enlargement.distance import Uncertainty
+from robot_side.field.along import Along
+from robot_side.laws.law import MOST_M
+from robot_side.laws.path import Waypoint, at_waypoint
 from robot_side.tick.sensed import R2, STICK
+from robot_side.tick.situation import Situation
 
 BEYOND_M: Final = 0.05
 """Distance examined beyond the stopping distance (loop age, reaction and braking), because the loop age varies"""
-FIELD_PERIOD_S: Final = 0.01
-"""Period of looks from the gripper's present pose, as controllers are written to no more often. Looks from places ahead
-on the path have three times this period."""
-
-_find_ability = call_at_address(BOOL, ABILITY)
-_prediction_error = inlined(prediction_error)
+_BETWEEN_S: Final = 0.02
+"""Time for which the gripper may go on at full speed after a look, and its surroundings are still known"""
 
 
-def stopping_s(speed: float, acceleration: float, loop_age: float) -> float:
-    """Return the time in s from a report until the arm stands: full speed for loop age and reaction, then braking."""
-    return loop_age + HORIZON_S + speed / acceleration
+class Asked(NamedTuple):
+    """Arguments of one look, `Ahead.look`: gripper, objects' classes, direction, half gap."""
+
+    pose: GripperPose
+    classes: IntArray
+    along: Along
+    widest_m: float
 
 
-stopping = inlined(stopping_s)
-"""The function `stopping_s` for calls from kernels"""
+@dataclass(frozen=True)
+class Prospect:
+    """What is asked of a look, what the arm can do along it, and how its onset distances count from the tool."""
+
+    asked: Asked
+    able: Ability
+    gone_m: float = 0.0
+    """Distance that the trigger has moved the gripper when it is at the look's waypoint"""
+    stretch: float = 1.0
+    """Length of the curved path divided by that of its chord"""
+
+    def from_tool_m(self, onsets_m: FloatArray) -> FloatArray:
+        """Return a look's onset distances as distances from the tool's present position."""
+        return onsets_m if self.stretch == 1.0 and self.gone_m == 0.0 else self.gone_m + self.stretch * onsets_m
 
 
-@inlined
-def horizon_m(speed: float, acceleration: float, loop_age: float) -> float:
+@dataclass(frozen=True)
+class Assumed:
+    """What a law assumes: errors, the arm's limits and its speeds at full travel and deflection."""
+
+    uncertainty: Uncertainty
+    limits: JointLimits
+    motion: ToolMotionSettings
+
+
+def stopping_s(able: Ability, loop_age_s: float) -> float:
+    """Return the time from a report until the arm stands: full speed for loop age and reaction, then braking."""
+    return loop_age_s + HORIZON_S + able.full_speed_m_s / able.acceleration_m_s2
+
+
+def horizon_m(able: Ability, loop_age_s: float) -> float:
     """Return the distance to examine: the stopping distance from full speed, reaction included, plus BEYOND_M."""
-    return speed * (loop_age + HORIZON_S) + speed * speed / (2.0 * acceleration) + BEYOND_M
+    speed_m_s = able.full_speed_m_s
+    return speed_m_s * (loop_age_s + HORIZON_S) + speed_m_s**2 / (2.0 * able.acceleration_m_s2) + BEYOND_M
 
 
-FIND_PROSPECT: Final = (BUNDLE, INT64, input_array(2), input_array(2), FLOAT64, FLOAT64, FLOAT64, BOOL, FLOAT64)
-"""Argument types of `find_prospect`, for calls by address"""
-
-
-@compiled(*FIND_PROSPECT, returns=BOOL)
-def find_prospect(
-    bundle: IntArray,
+def prospect(
     side: int,
-    rotation: FloatArray,
-    jacobian: FloatArray,
-    right: float,
-    up: float,
-    loop_age: float,
-    by_operator: bool,
-    gone: float,
-) -> bool:
-    """Fill the memory's `prospect` and `direction` for a look along one side.
+    situation: Situation,
+    ahead_m_s: float,
+    classes: IntArray,
+    assumed: Assumed,
+    waypoint: Waypoint | None = None,
+) -> Prospect:
+    """Return the prospect of a look along one side from the gripper's present pose, or from a waypoint.
 
-    Return False if the Jacobian or direction is not finite, or a joint's limit is not above 0. bundle: the memory's.
-    rotation (3, 3): the tool's at the look's place. jacobian (6, n): the tool's present one. right, up: the stick's
-    deflection. by_operator: whether the operator side predicts δ. gone: distance (m) that the trigger has moved the
-    gripper when it is at the look's place.
+    ahead_m_s: the tool's speed along its approach axis; commands under way keep it for at most the loop age. classes
+    (k,): the objects'.
     """
-    memory = memory_at(bundle)
-    settings, found, able = memory.settings[0], memory.prospect[0], memory.able
-    length = norm(load(memory.chord.reshape(1, 3), 0))
-    for axis in range(3):
-        ahead = memory.chord[axis] / length
-        memory.direction[axis] = ahead if side == R2 else -ahead
-        if side == STICK:
-            memory.direction[axis] = (right * rotation[axis, 0] - up * rotation[axis, 1]) / math.hypot(right, up)
-        found.direction[axis] = memory.direction[axis]
-    full_speed = settings.stick_speed if side == STICK else settings.trigger_speed
-    given = jacobian, memory.direction, full_speed, memory.limits_rad_s, memory.accelerations_rad_s2, able
-    if not _find_ability(memory.kernels[Kernel.ABILITY], given):
-        return False
-    found.speed, found.acceleration = able[0], able[1]
-    mean, sd = 0.0, 0.0
+    pose, age_s, (right, up) = situation.pose, situation.loop_age_s, situation.lateral
+    forth, full_speed_m_s, gone_m, stretch = (1.0 if side == R2 else -1.0), assumed.motion.trigger_speed_m_s, 0.0, 1.0
+    direction: FloatArray = forth * pose.tool_rotation[:, 2]
+    if side == STICK:
+        full_speed_m_s = assumed.motion.stick_speed_m_s
+        across = right * pose.tool_rotation[:, 0] - up * pose.tool_rotation[:, 1]
+        direction = across / math.hypot(right, up)
+    elif waypoint is not None:
+        gone_m = max(forth * ahead_m_s, 0.0) * min(waypoint.moved_s, age_s)
+        pose, chord = at_waypoint(pose, waypoint, forth * gone_m)
+        stretch = 1.0 / math.sqrt(float(chord @ chord))
+        direction = (forth * stretch) * chord
+    able = ability(pose, assumed.limits, direction, full_speed_m_s)
+    farthest_m = horizon_m(able, age_s) + _BETWEEN_S * full_speed_m_s
+    along = _along(direction, able, situation, assumed.uncertainty, max(farthest_m - gone_m, 0.0) / stretch, side)
+    widest_m = math.inf if situation.gap_m is None else 0.5 * max(situation.gap_m, 0.0)
+    return Prospect(Asked(pose, classes, along, widest_m), able, gone_m, stretch)
+
+
+def _along(
+    direction: FloatArray, able: Ability, situation: Situation, uncertainty: Uncertainty, reach_m: float, side: int
+) -> Along:
+    """Return the direction with the errors along it, and what comes nearer against it."""
+    age_s, mean_m, sd_m = situation.loop_age_s, 0.0, 0.0
     # The stick's rumble takes the commanded speed: no prediction, so no prediction error.
     if side != STICK:
-        rows = memory.missed_by_operator if by_operator else memory.missed_by_robot
-        mean, sd = _prediction_error(rows, loop_age, found.speed)
+        mean_m, sd_m = uncertainty.prediction.at(situation.compensation, age_s, able.full_speed_m_s)
     # Until it stands, an arm that does not follow goes on as it now does.
-    mean += settings.astray * (loop_age + found.speed / found.acceleration)
-    found.mean, found.mean_along, found.variance_along = 0.0, mean, sd * sd
-    for axis in range(3):
-        found.mean += found.direction[axis] * settings.mean[axis]
-    farthest = horizon_m(found.speed, found.acceleration, loop_age) + 2.0 * FIELD_PERIOD_S * full_speed
-    found.gone, found.stretch, found.reach = gone, 1.0 / length, max(farthest - gone, 0.0) * length
-    return True
+    mean_m += situation.astray_m_s * (age_s + able.full_speed_m_s / able.acceleration_m_s2)
+    velocities_m_s, approach_m = situation.objects.velocities_m_s, None
+    if velocities_m_s is not None and velocities_m_s.any():
+        closing_m_s = np.maximum(-(velocities_m_s @ direction), 0.0)
+        approach_m = np.minimum(closing_m_s * stopping_s(able, age_s), MOST_M)
+    return Along(
+        direction=direction,
+        mean_m=uncertainty.mean_along_m(direction),
+        variance_m2=uncertainty.camera_sd_m**2,
+        quantile=uncertainty.quantile,
+        reach_m=reach_m,
+        mean_along_m=mean_m,
+        variance_along_m2=sd_m * sd_m,
+        approach_m=approach_m,
+    )

@@ -1,90 +1,108 @@
-"""Store of the recent looks along each side from each place. `felt` takes the shortest of their onset distances."""
+"""Recent looks along one side. The shortest of their onset distances count, each less the tool's motion since the look.
+
+If the tool has only translated since, the subtraction is exact.
+"""
 
 import math
+from dataclasses import dataclass, field
 from typing import Final
 
-from common.arrays import FloatArray, IntArray
-from robot_side.compiled.kernel import inlined
-from robot_side.compiled.vectors import Vector, dot, load
-from robot_side.field.scratch import STRENGTHS
-from robot_side.laws.memory import ROOM, SIDES, memory_at
-from robot_side.laws.prospect import FIELD_PERIOD_S
+import numpy as np
+
+from common.arrays import BoolArray, FloatArray, IntArray
+from robot_side.arm.ability import Ability
+from robot_side.laws.path import EVEN_WAYPOINTS
+from robot_side.tick.sensed import STRENGTHS
 
 STEADY_S: Final = 0.1
 """Time for which a look's onset distances count. The operator side also lets a trigger's strength fall over 0.1 s."""
+WAYPOINT_PERIOD_S: Final = 0.03
+"""Period of the looks from each waypoint on the path"""
 _SAME_DIRECTION: Final = 0.999
 """Cosine of the largest angle, 2.6°, at which two looks count as along the same direction"""
+_MOST_WAYPOINTS: Final = EVEN_WAYPOINTS + 2
+ROOM: Final = 80
+"""Capacity; if it is used up, the oldest look is replaced"""
 
 
-@inlined
-def look_from(bundle: IntArray, side: int, places: int) -> None:
-    """Set the number of places from which looks along one side are made; forget looks from any further places."""
-    memory = memory_at(bundle)
-    first, kept = ROOM * side, 0
-    for place in range(memory.places[side], places):
-        memory.looked_s[side, place], memory.nearest_m[side, place] = -math.inf, math.inf
-    if places < memory.places[side]:
-        for k in range(first, first + memory.counts[side]):
-            if memory.seen[k].place < places:
-                memory.seen[first + kept] = memory.seen[k]
-                kept += 1
-        memory.counts[side] = kept
-    memory.places[side] = places
+@dataclass(frozen=True)
+class Newest:
+    """Newest look along one side from the gripper's present pose."""
+
+    direction: FloatArray
+    """(3,) unit vector û"""
+    began_m: float
+    """The tool's position along û at the time of the look"""
+    reach_m: float
+    """Distance examined"""
+    able: Ability
+    sigma_m: float
+    """Largest D_σ"""
+
+    def known_m(self, tool_m: FloatArray) -> float:
+        """Return the distance ahead of the tool (3,) that the look still covers."""
+        return self.reach_m - (float(self.direction @ tool_m) - self.began_m)
 
 
-@inlined
-def longest_waiting(bundle: IntArray, now: float) -> tuple[float, int, int]:
-    """Return the longest time since a look, in periods, with the look's side and place.
+@dataclass
+class RecentLooks:
+    """Looks along one side from the present pose, which is waypoint 0, and from those ahead, 1 and so on."""
 
-    Places ahead on the path have three times the period of place 0.
-    """
-    memory = memory_at(bundle)
-    most, of_side, of_place = -math.inf, 0, 0
-    for side in range(SIDES):
-        for place in range(memory.places[side]):
-            period = 3.0 * FIELD_PERIOD_S if place > 0 else FIELD_PERIOD_S
-            waited = (now - memory.looked_s[side, place]) / period
-            if waited > most:
-                most, of_side, of_place = waited, side, place
-    return most, of_side, of_place
+    waypoints: int = 0
+    """Number of waypoints ahead"""
+    _at_s: FloatArray = field(default_factory=lambda: np.full(ROOM, -np.inf))
+    """Time of each look; minus infinity for a free row"""
+    _waypoint: IntArray = field(default_factory=lambda: np.zeros(ROOM, dtype=np.int64))
+    _direction: FloatArray = field(default_factory=lambda: np.zeros((ROOM, 3)))
+    _reached_m: FloatArray = field(default_factory=lambda: np.full((ROOM, 2 * STRENGTHS), np.inf))
+    """Onset distances, fast and slow list, plus the tool's position along û: where on û each strength begins"""
+    _looked_s: FloatArray = field(default_factory=lambda: np.full(1 + _MOST_WAYPOINTS, -np.inf))
+    """Time of the last look from each waypoint"""
+    _nearest_m: FloatArray = field(default_factory=lambda: np.full(1 + _MOST_WAYPOINTS, np.inf))
+    """Onset distance of full strength (fast list) in the last look from each waypoint"""
 
+    def keep_up_to(self, waypoints: int) -> None:
+        """Set the number of waypoints ahead; forget the looks from any further ones."""
+        if waypoints < self.waypoints:
+            self._forget(self._waypoint > waypoints)
+            self._looked_s[waypoints + 1 :], self._nearest_m[waypoints + 1 :] = -np.inf, np.inf
+        self.waypoints = waypoints
 
-@inlined
-def longest_ago(bundle: IntArray) -> float:
-    """Return the time of the longest-waiting last look: the earliest of all sides and places."""
-    memory = memory_at(bundle)
-    first = math.inf
-    for side in range(SIDES):
-        for place in range(memory.places[side]):
-            first = min(first, memory.looked_s[side, place])
-    return first
+    def forget(self) -> None:
+        """Forget all looks."""
+        if self._looked_s[0] > -np.inf:
+            self._forget(self._waypoint >= 0)
+            self._looked_s[:], self._nearest_m[:] = -np.inf, np.inf
 
+    def due(self, passed_s: float, now_s: float) -> list[int]:
+        """Return the waypoints ahead to look from: all that are new, and the share that is due after `passed_s`."""
+        if self.waypoints == 0:
+            return []
+        waited_s = now_s - self._looked_s[1 : self.waypoints + 1]
+        share = math.ceil(self.waypoints * min(passed_s / WAYPOINT_PERIOD_S, 1.0))
+        first = 1 + np.argsort(-waited_s, kind="stable")[: max(share, int(np.isinf(waited_s).sum()))]
+        return [int(number) for number in first]
 
-@inlined
-def keep(bundle: IntArray, side: int, place: int, now: float, tool: Vector, onsets: FloatArray) -> None:
-    """Store a look that was made along the memory's prospect. onsets (2, 8): its onset distances, fast and slow list.
+    def nearest(self, even: int) -> int:
+        """Return which of the waypoints 0 to `even` has the shortest onset distance of full strength."""
+        return int(self._nearest_m[: even + 1].argmin())
 
-    tool: the tool's position. Earlier looks from the same place are forgotten if they are older than STEADY_S or along
-    another direction. If the store is full, the oldest look is replaced.
-    """
-    memory = memory_at(bundle)
-    along, first, kept = load(memory.direction.reshape(1, 3), 0), ROOM * side, 0
-    seen, oldest = memory.seen, first
-    for k in range(first, first + memory.counts[side]):
-        one = seen[k]
-        alike = dot((one.direction[0], one.direction[1], one.direction[2]), along) > _SAME_DIRECTION
-        if one.place != place or (alike and now - one.at < STEADY_S):
-            seen[first + kept] = one
-            if one.at < seen[oldest].at:
-                oldest = first + kept
-            kept += 1
-    row = oldest if kept == ROOM else first + kept
-    memory.counts[side], memory.looked_s[side, place] = min(kept + 1, ROOM), now
-    new, prospect = seen[row], memory.prospect[0]
-    new.place, new.at, new.began = place, now, dot(along, tool)
-    for axis in range(3):
-        new.direction[axis] = along[axis]
-    for kind in range(2):
-        for strength in range(STRENGTHS):
-            new.onsets[kind, strength] = prospect.gone + prospect.stretch * onsets[kind, strength]
-    memory.nearest_m[side, place] = new.onsets[0, STRENGTHS - 1]
+    def add(self, waypoint: int, now_s: float, direction: FloatArray, began_m: float, onsets_m: FloatArray) -> None:
+        """Store a look. onsets_m (2, 8): fast and slow list, from the tool's present position.
+
+        Earlier looks from the same waypoint are forgotten if they are older than STEADY_S or along another direction.
+        """
+        old = (self._at_s <= now_s - STEADY_S) | (self._direction @ direction <= _SAME_DIRECTION)
+        self._forget(old & (self._waypoint == waypoint))
+        row = int(self._at_s.argmin())
+        self._at_s[row], self._waypoint[row], self._direction[row] = now_s, waypoint, direction
+        self._reached_m[row] = onsets_m.ravel() + began_m
+        self._looked_s[waypoint], self._nearest_m[waypoint] = now_s, onsets_m[0, -1]
+
+    def shortest_m(self, tool_m: FloatArray) -> FloatArray:
+        """Return the shortest onset distances (2, 8) from the tool's present position (3,); infinite without looks."""
+        shortest_m: FloatArray = (self._reached_m - (self._direction @ tool_m)[:, None]).min(axis=0)
+        return shortest_m.reshape(2, STRENGTHS)
+
+    def _forget(self, rows: BoolArray) -> None:
+        self._at_s[rows], self._reached_m[rows] = -np.inf, np.inf

@@ -13,18 +13,7 @@ from common.roles import Role
 from common.statistics import BLOCK, RunningStatistics
 from robot_side.outcome.placing import Placing, scaled
 from robot_side.tick.events import Listener, Tick
-from robot_side.tick.sensed import (
-    ENLARGEMENT,
-    L2,
-    NUMBERS,
-    NUMBERS_PER_SIDE,
-    OVERLAP,
-    R2,
-    RUMBLE,
-    STIFFNESS,
-    TOOL_SPEED,
-    Sensed,
-)
+from robot_side.tick.sensed import Sensed
 
 if TYPE_CHECKING:
     from robot_side.tick.truth import ContactOnset, Truth
@@ -37,7 +26,6 @@ _CONTACT_REST_S = 0.1
 gripper: a sliding touch chatters, and two fingers do not close simultaneously."""
 
 
-_L2_STIFFNESS, _R2_STIFFNESS = L2 * NUMBERS_PER_SIDE + STIFFNESS, R2 * NUMBERS_PER_SIDE + STIFFNESS
 _MOST_ROWS = 8 * BLOCK
 """Maximum number of ticks that wait to be evaluated"""
 
@@ -53,8 +41,8 @@ class RunFigures(Listener):
         self._start_s: float | None = None
         self._next_truth_s = -np.inf
         self._loop_age = RunningStatistics(seed)
-        self._rows: list[tuple[FloatArray, bool, bool]] = []
-        """Numbers of `Sensed` in the newest ticks, each with whether the arm was armed and the loop age settled"""
+        self._rows: list[tuple[Sensed, bool, bool]] = []
+        """Results of the newest ticks, each with whether the arm was armed and the loop age settled"""
         self._enlargement = RunningStatistics(seed)
         self._enlargement_moving = RunningStatistics(seed)
         self._overlap = RunningStatistics(seed)
@@ -72,7 +60,8 @@ class RunFigures(Listener):
         self._lifted_m = 0.0
         self._placing = Placing()
         self._held = False
-        self._newest: FloatArray = np.zeros(NUMBERS)
+        self._warns = False
+        """Whether the newest tick has any stiffness or rumble"""
         self._unread: list[Tick] = []
 
     def on_tick(self, tick: Tick) -> None:
@@ -122,23 +111,21 @@ class RunFigures(Listener):
         Stiffness counts as 0 unless the arm is armed, as nobody feels it. settled: whether the loop age is; until then
         the enlargement is unknown.
         """
-        self._newest = sensed.numbers
-        self._rows.append((sensed.numbers, armed, settled))
+        self._warns = max(sensed.rumble, sensed.l2.stiffness, sensed.r2.stiffness) > 0.0
+        self._rows.append((sensed, armed, settled))
         self.ticks += 1
         if len(self._rows) == _MOST_ROWS:
             self._take_in()
 
     def _take_in(self) -> None:
-        if not self._rows:
-            return
-        numbers, armed, settled = (np.array(column) for column in zip(*self._rows, strict=True))
-        self._rows.clear()
-        enlargement_m = numbers[settled, ENLARGEMENT]
-        self._enlargement.extend(enlargement_m.tolist())
-        self._enlargement_moving.extend(enlargement_m[numbers[settled, TOOL_SPEED] > MOVING_M_S].tolist())
-        self._overlap.extend(numbers[:, OVERLAP].tolist())
-        self._l2.extend((armed * numbers[:, _L2_STIFFNESS]).tolist())
-        self._r2.extend((armed * numbers[:, _R2_STIFFNESS]).tolist())
+        rows, self._rows = self._rows, []
+        self._enlargement.extend([sensed.enlargement_m for sensed, _, settled in rows if settled])
+        self._enlargement_moving.extend(
+            [sensed.enlargement_m for sensed, _, settled in rows if settled and sensed.tool_speed_m_s > MOVING_M_S]
+        )
+        self._overlap.extend([sensed.overlap_m3 for sensed, _, _ in rows])
+        self._l2.extend([armed * sensed.l2.stiffness for sensed, armed, _ in rows])
+        self._r2.extend([armed * sensed.r2.stiffness for sensed, armed, _ in rows])
 
     def truth(self, truth: Truth, roles: Mapping[str, Role], now_s: float) -> None:
         """Add true distances and contacts from the simulation; count the contacts that begin."""
@@ -151,8 +138,7 @@ class RunFigures(Listener):
                 self._obstacle_contacts += roles[name] is Role.OBSTACLE
             self._touched_s[name] = now_s
         if truth.target is not None:
-            warned = self._newest[[RUMBLE, _L2_STIFFNESS, _R2_STIFFNESS]].max() > 0.0
-            self._placing.observe(truth.target, self._held, bool(warned), now_s)
+            self._placing.observe(truth.target, self._held, self._warns, now_s)
 
     @property
     def touched(self) -> bool:

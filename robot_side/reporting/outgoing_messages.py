@@ -15,7 +15,7 @@ from robot_side.arm.port import ArmState, GripperPose
 from robot_side.arm.stick_frames import StickFrames
 from robot_side.operators.operator_session import Receiver
 from robot_side.tick.outgoing import SHOWN_NAME, Outgoing
-from robot_side.tick.sensed import L2, R2, Sensed
+from robot_side.tick.sensed import Sensed
 
 _AROUND_S: Final = 0.1
 _AROUND_AGAIN_S: Final = 0.4
@@ -108,8 +108,8 @@ def telemetry(
         gripper_opening_m=max(0.0, arm.gripper_opening_m),
         holding=holding,
         enlargement_m=min(sensed.enlargement_m, _LARGEST_M) if settled else 0.0,
-        l2=sensed.stiffness(L2),
-        r2=sensed.stiffness(R2),
+        l2=sensed.l2.stiffness,
+        r2=sensed.r2.stiffness,
         undone=hindrance.undone,
         hindrance=hindrance.text,
         base_turn_rad=0.0 if frames is None else frames.base.turn_rad(tool),

@@ -14,30 +14,14 @@ millimetres.
 """
 
 import math
-from typing import Any, Final, get_args
+from dataclasses import dataclass
+from typing import Any, Final
 
-import numpy as np
-
-from common.arrays import FloatArray
 from common.following import follow
-from common.protocol.messages import MotionCommand, MotionState, Telemetry
+from common.protocol.messages import MotionCommand, MotionState, Telemetry, TriggerField
 from common.reaction import WRITE_S
 from common.silence import KEEP_ALIVE_S
-from robot_side.compiled.kernel import BOOL, FLOAT64, INT64, compiled, inlined, input_array, output_array, record_array
-from robot_side.tick.sensed import (
-    ACCELERATION,
-    DISPLACEMENT,
-    FULL_SPEED,
-    HORIZON,
-    L2,
-    NUMBERS,
-    NUMBERS_PER_SIDE,
-    R2,
-    RUMBLE,
-    SPEED,
-    STIFFNESS,
-    Sensed,
-)
+from robot_side.tick.sensed import Sensed
 
 _DEADBAND_M: Final = 1e-3
 _DEADBAND_SHARE: Final = 0.02
@@ -46,23 +30,33 @@ _NEARER: Final = 0.25
 _HALF_A_TICK_S: Final = 0.5e-3
 """Tolerance of a deadline, in seconds: half a tick, so that the nearest tick counts"""
 _EIGHTHS: Final = 8.0
-_STATES: Final[dict[MotionState, int]] = {state: number for number, state in enumerate(get_args(MotionState))}
-_ARMED: Final = _STATES["armed"]
-_STANDS: Final = len(_STATES)
-_HINDERED: Final = 2 * _STANDS
-_BELIEF: Final = np.dtype(
-    [
-        *((name, np.float64) for name in ("sent", "now", "displacement", "speed", "target", "commanded")),
-        *((name, np.int64) for name in ("known", "state", "obeyed")),
-    ]
-)
-"""What the receiver computes from the last message. sent, now: times of that message and of the last update, in s.
-displacement, speed, target: motion along R2 by commands since that message, in m and m/s. commanded: the arm's
-commanded speed in the message, in m/s. known: whether a message has been sent. state: number of the state of motion,
-plus _STANDS if the held object stands, plus _HINDERED if the arm is hindered. obeyed: sequence number of the newest
-command when the message was sent."""
 
-_follow = inlined(follow)
+
+@dataclass
+class _Belief:
+    """What the receiver computes from the last message, by the commands that have arrived since."""
+
+    sensed: Sensed
+    sent_s: float
+    state: tuple[MotionState, bool, bool]
+    """State of motion, whether the held object stands, and whether the arm is hindered"""
+    obeyed: int
+    """Sequence number of the newest command when the message was sent"""
+    commanded_m_s: float
+    """The arm's commanded speed in the message"""
+    target_m_s: float
+    speed_m_s: float
+    """Speed along R2 that the receiver assumes"""
+    now_s: float
+    """Time of the last update"""
+    displacement_m: float = 0.0
+    """Distance along R2 that the receiver assumes since the message"""
+
+    def advance(self, now_s: float) -> None:
+        """Carry the receiver's assumed motion to `now_s`."""
+        acceleration_m_s2, passed_s = self.sensed.r2.acceleration_m_s2, now_s - self.now_s
+        moved = follow(self.displacement_m, self.speed_m_s, self.target_m_s, acceleration_m_s2, passed_s)
+        (self.displacement_m, self.speed_m_s), self.now_s = moved, now_s
 
 
 class StiffnessDeadband:
@@ -73,12 +67,11 @@ class StiffnessDeadband:
         self._full_rate = full_rate
         self.interval_s = 0.0
         """Minimum time between two stiffness messages, in s, set by the link's rate; a change of state never waits."""
-        self._sent: FloatArray = np.zeros(NUMBERS)
-        self.forget()
+        self._belief: _Belief | None = None
 
     def forget(self) -> None:
         """Begin with another receiver, to which nothing has been sent yet."""
-        self._belief: np.ndarray = np.zeros(1, dtype=_BELIEF)
+        self._belief = None
 
     def due(
         self,
@@ -99,111 +92,65 @@ class StiffnessDeadband:
         if command is not None:
             obeyed, travel = command.header.sequence, command.r2 - command.l2
             by_operator = command.compensation == "operator"
-        due: bool = _due(
-            *(self._belief, self._sent, sensed.numbers, told_m_s),
-            *(_STATES[state] + _STANDS * stands + _HINDERED * hindered, obeyed, travel, by_operator),
-            *(self.interval_s, self._full_rate, now_s),
-        )
-        return due
+        belief, states = self._belief, (state, stands, hindered)
+        if belief is not None:
+            belief.advance(now_s)
+            if not self._full_rate and not _matters(belief, sensed, states, by_operator, self.interval_s, now_s):
+                # The receiver does not know yet how fast the arm follows a later command.
+                later_m_s = travel * belief.sensed.r2.full_speed_m_s
+                belief.target_m_s = belief.commanded_m_s if obeyed == belief.obeyed else later_m_s
+                return False
+        self._belief = _Belief(sensed, now_s, states, obeyed, told_m_s, told_m_s, sensed.speed_m_s, now_s)
+        return True
 
 
-@inlined
-def _braking_m(speed: float, acceleration: float) -> float:
-    return max(0.0, speed) * max(0.0, speed) / (2.0 * acceleration)
+def _matters(
+    belief: _Belief,
+    sensed: Sensed,
+    state: tuple[MotionState, bool, bool],
+    by_operator: bool,
+    interval_s: float,
+    now_s: float,
+) -> bool:
+    since_s, sent = now_s - belief.sent_s + _HALF_A_TICK_S, belief.sensed
+    if state != belief.state or since_s >= KEEP_ALIVE_S:
+        return True
+    if state[0] != "armed" or since_s < interval_s:  # not armed: triggers are released
+        return False
+    if sensed.rumble > sent.rumble:
+        return True
+    patient, shown = since_s < WRITE_S, sensed.rumble != sent.rumble
+    for now, then, sign in ((sensed.r2, sent.r2, 1.0), (sensed.l2, sent.l2, -1.0)):
+        # A receiver that does not compute δ adds δ of the message.
+        moved_m = sign * belief.displacement_m if by_operator else then.displacement_m - now.displacement_m
+        # The braking distance from a speed above the trigger's adds to δ: at most this.
+        moved_m += _braking_m(sign * belief.speed_m_s, then.acceleration_m_s2)
+        moved_m -= _braking_m(sign * sensed.speed_m_s, now.acceleration_m_s2)
+        if _is_wrong(now, then, moved_m, sensed.horizon_m, patient):
+            return True
+        shown |= int(_EIGHTHS * now.stiffness) != int(_EIGHTHS * then.stiffness)
+    return not patient and shown
 
 
-@inlined
-def _wrong(numbers: FloatArray, sent: FloatArray, side: int, moved: float, patient: bool) -> bool:
-    """Compare the distances with the sent distances minus `moved` (m); return whether an error counts.
+def _braking_m(speed_m_s: float, acceleration_m_s2: float) -> float:
+    return max(0.0, speed_m_s) ** 2 / (2.0 * acceleration_m_s2)
+
+
+def _is_wrong(now: TriggerField, sent: TriggerField, moved_m: float, horizon_m: float, patient: bool) -> bool:
+    """Compare the distances with the sent distances minus `moved_m`; return whether an error counts.
 
     patient: ignore distances that became longer. A distance at the horizon never counts as shorter: nothing is known
     beyond the horizon, and the last message still holds.
     """
-    for place in range(side * NUMBERS_PER_SIDE, side * NUMBERS_PER_SIDE + DISPLACEMENT):
-        onset = numbers[place]
-        apart = onset - sent[place] + moved
-        if apart < -_NEARER * _DEADBAND_M:
-            if apart < -_NEARER * _DEADBAND_SHARE * onset and onset < numbers[HORIZON]:
+    for onsets_m, before_m in ((now.fast_m, sent.fast_m), (now.slow_m, sent.slow_m)):
+        for onset_m, was_m in zip(onsets_m, before_m, strict=True):
+            apart_m = onset_m - was_m + moved_m
+            if apart_m < -_NEARER * _DEADBAND_M:
+                if apart_m < -_NEARER * _DEADBAND_SHARE * onset_m and onset_m < horizon_m:
+                    return True
+            elif apart_m > _DEADBAND_M and not patient and apart_m > _DEADBAND_SHARE * onset_m:
                 return True
-        elif apart > _DEADBAND_M and not patient and apart > _DEADBAND_SHARE * onset:
-            return True
     return False
-
-
-@inlined
-def _matters(
-    belief: Any, sent: FloatArray, numbers: FloatArray, state: int, by_operator: bool, interval: float, now: float
-) -> bool:
-    since = now - belief.sent + _HALF_A_TICK_S
-    if state != belief.state or since >= KEEP_ALIVE_S:
-        return True
-    if state % _STANDS != _ARMED or since < interval:  # not armed: triggers are released
-        return False
-    if numbers[RUMBLE] > sent[RUMBLE]:
-        return True
-    patient, shown = since < WRITE_S, numbers[RUMBLE] != sent[RUMBLE]
-    for side in (R2, L2):
-        first, sign = side * NUMBERS_PER_SIDE, 1.0 if side == R2 else -1.0
-        # A receiver that does not compute δ adds δ of the message.
-        moved = (
-            sign * belief.displacement if by_operator else sent[first + DISPLACEMENT] - numbers[first + DISPLACEMENT]
-        )
-        # The braking distance from a speed above the trigger's adds to δ: at most this.
-        moved += _braking_m(sign * belief.speed, sent[first + ACCELERATION])
-        moved -= _braking_m(sign * numbers[SPEED], numbers[first + ACCELERATION])
-        if _wrong(numbers, sent, side, moved, patient):
-            return True
-        shown |= int(_EIGHTHS * numbers[first + STIFFNESS]) != int(_EIGHTHS * sent[first + STIFFNESS])
-    return not patient and shown
-
-
-@compiled(
-    *(
-        record_array(_BELIEF),
-        output_array(1),
-        input_array(1),
-        FLOAT64,
-        INT64,
-        INT64,
-        FLOAT64,
-        BOOL,
-        FLOAT64,
-        BOOL,
-        FLOAT64,
-    ),
-    returns=BOOL,
-)
-def _due(
-    beliefs: np.ndarray,
-    sent: FloatArray,
-    numbers: FloatArray,
-    commanded: float,
-    state: int,
-    obeyed: int,
-    travel: float,
-    by_operator: bool,
-    interval: float,
-    full_rate: bool,
-    now: float,
-) -> bool:
-    """Return whether to send, and update what the receiver computes; `sent`, `numbers` (NUMBERS,): as in `Sensed`."""
-    belief = beliefs[0]
-    if belief.known == 1:
-        acceleration = sent[R2 * NUMBERS_PER_SIDE + ACCELERATION]
-        belief.displacement, belief.speed = _follow(
-            belief.displacement, belief.speed, belief.target, acceleration, now - belief.now
-        )
-    belief.now = now
-    if belief.known == 1 and not full_rate and not _matters(belief, sent, numbers, state, by_operator, interval, now):
-        # The receiver does not know yet how fast the arm follows a later command.
-        later = travel * sent[R2 * NUMBERS_PER_SIDE + FULL_SPEED]
-        belief.target = belief.commanded if obeyed == belief.obeyed else later
-        return False
-    for i in range(sent.size):
-        sent[i] = numbers[i]
-    belief.known, belief.state, belief.sent, belief.obeyed = 1, state, now, obeyed
-    belief.displacement, belief.speed, belief.commanded, belief.target = 0.0, numbers[SPEED], commanded, commanded
-    return True
 
 
 _SEEN_M: Final = 0.5e-3

@@ -29,7 +29,7 @@ def built(**settings: Any) -> RobotSide:
 
 
 def knows(robot: RobotSide) -> Uncertainty:
-    found: Uncertainty = robot.parts.law._uncertainty  # type: ignore[attr-defined]
+    found: Uncertainty = robot.parts.law.assumed.uncertainty  # type: ignore[attr-defined]
     return found
 
 
@@ -90,7 +90,7 @@ def test_what_errs_is_known_to_the_law_as_it_is_to_the_simulation() -> None:
     assert error.variance_m2 == pytest.approx(0.005**2)
     law = robot.parts.law
     assert isinstance(law, SweptLaw)
-    np.testing.assert_allclose(law.encoder_sigma_rad, 1e-3)
+    np.testing.assert_allclose(law.looking.ahead.encoder_sigma_rad, 1e-3)
 
 
 def test_the_gripper_is_covered_as_closely_as_is_set() -> None:

@@ -85,14 +85,17 @@ class Judged:
             return strengths
         record = draw.replay.record
         law, rendering = self._law(draw), TriggerRendering(RenderingSettings(), TravelCalibration())
+        mapped_s = -math.inf
         for number, felt_s in enumerate(times_s.tolist()):
             tick = record.tick_row(felt_s)
             sent_s = record.seen_sent_s[tick]
             if np.isnan(sent_s) or sent_s < record.pose_time_s[0]:
                 continue
             row = record.pose_row(float(sent_s))
-            if isinstance(law, SweptLaw) and self.law == "swept":
-                self._look_around(law, draw, float(sent_s))
+            if isinstance(law, SweptLaw) and self.law == "swept" and sent_s - mapped_s > 0.5 * PERIOD_S:
+                # A map is as old as its period when it is replaced, and half as old when it arrives.
+                mapped_s, of_map = float(sent_s), record.pose_row(float(sent_s) - 0.5 * PERIOD_S)
+                law.look_around(self._situation(draw, of_map), float(record.pose_time_s[of_map]))
             sensed = law.sense(self._situation(draw, row), float(record.pose_time_s[row]))
             pulled = [_TRAVEL.travel(min(travel / SENSED_TRAVEL, 1.0)) for travel in record.travel[tick]]
             message = _message(sensed, row)
@@ -102,23 +105,13 @@ class Judged:
                 strengths[number, trigger] = zones or 0
         return strengths
 
-    def _look_around(self, law: SweptLaw, draw: Draw, now_s: float) -> None:
-        """Compute the map of the surroundings anew if it is older than its period; its age counts as half of that."""
-        row = draw.replay.record.pose_row(now_s - 0.5 * PERIOD_S)
-        law.forget_around(now_s - PERIOD_S)
-        if np.isneginf(law.memory.around["at"]).any():
-            law.memory.state["next"] = -np.inf
-            law.sense(self._situation(draw, row), float(draw.replay.record.pose_time_s[row]))
-
     def _law(self, draw: Draw) -> RobotLaw:
         replay = draw.replay
         uncertainty = Uncertainty(self.probability, camera_sd_m=draw.camera_sd_m, prediction=_prediction_errors())
         arguments = uncertainty, replay.encoder_sigma_rad, MotionLimits().of_joints(replay.joints), replay.motion
         if law_of_robot(self.law) == "paper":
             return PaperLaw(*arguments)
-        law = SweptLaw(*arguments)
-        law.ask_around(asked=self.law == "swept")
-        return law
+        return SweptLaw(*arguments, maps=self.law == "swept")
 
     def _situation(self, draw: Draw, row: int) -> Situation:
         replay, record = draw.replay, draw.replay.record

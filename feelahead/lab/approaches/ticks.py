@@ -48,7 +48,7 @@ class Recorded:
         if not isinstance(law, SweptLaw):
             raise TypeError(f"law is a {type(law).__name__}; valid: a SweptLaw")
         # Fields along the triggers alone; contact distances from around are not computed.
-        law.ask_around(asked=False)
+        law.looking.probes = None
         return law
 
 

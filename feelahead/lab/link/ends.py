@@ -81,7 +81,7 @@ class RobotEnd(_Side):
         self._sockets, epoch = sockets, secrets.randbits(53)
         self._session = OperatorSession(lambda: LinkEnd("robot", epoch, clock_domain()), Safety(SafetySettings()))
         self._admission, self._loop_age = Admission(), LoopAge(0.2)
-        self._sensed = Sensed.of(uniform_field(3), uniform_field(0), speed_m_s=0.01, horizon_m=FAR_M)
+        self._sensed = Sensed(l2=uniform_field(3), r2=uniform_field(0), speed_m_s=0.01, horizon_m=FAR_M)
 
     def _received(self) -> Any:
         return self._sockets.receive()

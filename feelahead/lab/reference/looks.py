@@ -5,26 +5,42 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from common.arrays import BoolArray, FloatArray
+from common.arrays import BoolArray, FloatArray, IntArray
 from feelahead.lab.approaches.ticks import Recorded
 from feelahead.lab.reference.onsets_by_definition import defined_onsets
-from robot_side.field.field import Ahead
-from robot_side.laws.swept import Asked
+from robot_side.arm.port import GripperPose
+from robot_side.field.along import Along
+from robot_side.field.field import Ahead, Field
+from robot_side.laws.prospect import Asked
 from robot_side.surroundings.perceived import PerceivedObjects
-from robot_side.surroundings.scene_table import scene_table
+from robot_side.surroundings.scene_table import SceneTable, scene_table
 
 LATE_M = 1e-4
 """Limit in metres by which a contact distance may be later than its definition."""
 
 
+class _Noting(Ahead):
+    """Maker of looks that notes what each of them was asked."""
+
+    def __init__(self, encoder_sigma_rad: FloatArray) -> None:
+        super().__init__(encoder_sigma_rad)
+        self.asked: list[tuple[Asked, PerceivedObjects]] = []
+
+    def look(
+        self, pose: GripperPose, scene: SceneTable, classes: IntArray, along: Along, widest_m: float = np.inf
+    ) -> Field:
+        """Look, and note the arguments."""
+        self.asked.append((Asked(pose, classes, along, widest_m), scene.objects))
+        return super().look(pose, scene, classes, along, widest_m)
+
+
 def looks_of(recorded: Recorded, most: int) -> tuple[list[tuple[Asked, PerceivedObjects]], FloatArray]:
     """Run the law over the ticks of a run; return up to `most` of its looks, and the encoders' sigmas (n,)."""
-    law, asked = recorded.new_law(), list[tuple[Asked, PerceivedObjects]]()
+    law = recorded.new_law()
+    law.looking.ahead = noting = _Noting(law.looking.ahead.encoder_sigma_rad)
     for tick in recorded.ticks:
         law.sense(tick.situation, tick.now_s)
-        for side, place in np.argwhere(law.memory.looked_s == tick.now_s).tolist():
-            asked.append((law.asked(side, tick.situation, place), tick.situation.objects))
-    return asked[:: max(1, -(-len(asked) // most))], law.encoder_sigma_rad
+    return noting.asked[:: max(1, -(-len(noting.asked) // most))], noting.encoder_sigma_rad
 
 
 @dataclass(frozen=True)

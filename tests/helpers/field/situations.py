@@ -36,8 +36,8 @@ def uncertain(**changes: Any) -> Uncertainty:
     return replace(Uncertainty(0.99, camera_sd_m=CAMERA_SD_M, prediction=EXACT), **changes)
 
 
-def swept(encoder_sigma_rad: float = 0.0, **changes: Any) -> SweptLaw:
-    return SweptLaw(uncertain(**changes), np.full(6, encoder_sigma_rad), LIMITS, MOTION, Surroundings())
+def swept(encoder_sigma_rad: float = 0.0, *, maps: bool = False, **changes: Any) -> SweptLaw:
+    return SweptLaw(uncertain(**changes), np.full(6, encoder_sigma_rad), LIMITS, MOTION, Surroundings(), maps=maps)
 
 
 def paper(encoder_sigma_rad: float = 0.0, **changes: Any) -> PaperLaw:

@@ -16,6 +16,7 @@ from robot_side.field.along import Along
 from robot_side.field.object_class import OBSTACLE
 from robot_side.laws.swept import SweptLaw
 from robot_side.surroundings.perceived import PerceivedObjects
+from robot_side.tick.sensed import R2
 from tests.helpers.field.fields import ball_pose
 from tests.helpers.field.situations import (
     ACCELERATION_M_S2,
@@ -38,9 +39,7 @@ WALL = walls(0.1)
 
 
 def asking(**changes: Any) -> SweptLaw:
-    made = swept(**changes)
-    made.ask_around(asked=True)
-    return made
+    return swept(maps=True, **changes)
 
 
 @pytest.fixture
@@ -135,14 +134,14 @@ def looks(law: SweptLaw, ticks: int, velocity: FloatArray, now_s: float, **chang
     return law.summary()["fields"] - before
 
 
-def test_at_rest_nothing_is_looked_at_from_around_and_in_motion_one_look_a_tick(law: SweptLaw) -> None:
+def test_at_rest_nothing_is_looked_at_from_around_and_in_motion_every_probe_in_turn(law: SweptLaw) -> None:
     still, forth = np.zeros(6), np.array([0.0, 0.0, 0.2, 0.0, 0.0, 0.0])
     looks(law, 500, still, 0.0)
     resting = looks(law, 1000, still, 0.5)
     moving = looks(law, 1000, forth, 1.5)
-    # Looks along R2 and L2 are made a hundred times a second each.
-    assert resting == pytest.approx(200, abs=4)
-    assert moving - resting == pytest.approx(PROBES * (1.0 + 0.25) / PERIOD_S, rel=0.1)
+    # R2 and L2 are looked along every 50 ms at rest, and every 4 ms in motion.
+    assert resting == pytest.approx(2 / 0.05, abs=2)
+    assert moving - 2 / 0.004 == pytest.approx(PROBES * (1.0 + 0.25) / PERIOD_S, rel=0.1)
 
 
 def test_what_has_just_appeared_straight_ahead_is_in_the_next_map(law: SweptLaw) -> None:
@@ -195,8 +194,14 @@ def test_no_probe_starves_however_late_the_ticks_are(law: SweptLaw, step_s: floa
         now_s += step_s
         asked = situation(ball_pose(), WALL, joint_velocities_rad_s=drifting, loop_age_s=LOOP_S, lateral=(1.0, 0.0))
         law.sense(asked, now_s)
-    assert now_s - law.memory.around["at"][:PROBES].min() < 1.0
-    assert law.around(ball_pose()) is not None
+    probes = law.looking.probes
+    assert probes is not None
+    assert probes.known
+    # The looks along the trigger that leads are as old as their period at most, and the others four periods.
+    probes.turn(FULL_S, now_s + 1.5 - 4.0 * PERIOD_S - 2.0 * step_s, traced=True, moved=True)
+    assert probes.known
+    probes.turn(FULL_S, now_s + 1.5 + step_s, traced=True, moved=True)
+    assert not probes.known
 
 
 @pytest.mark.parametrize("loop_s", [0.2, 1.5, 5.0, 120.0])
@@ -212,14 +217,14 @@ def test_a_map_of_before_is_withheld_and_the_robot_side_follows_the_path_itself(
     drifting = np.array([0.1, 0.0, 0.2, 0.0, 0.0, 0.0])
     looks(law, 300, drifting, 0.0)
     assert law.around(ball_pose()) is not None
-    assert law.memory.state["even_places"][0] == 0
+    assert law.looking.sides[R2].waypoints == 0
     law.expect(0.5)
     looks(law, 20, drifting, 0.3)
     assert law.around(ball_pose()) is None
-    assert law.memory.state["even_places"][0] > 0
+    assert law.looking.sides[R2].waypoints > 0
     looks(law, 300, drifting, 0.32)
     assert law.around(ball_pose()) is not None
-    assert law.memory.state["even_places"][0] == 0
+    assert law.looking.sides[R2].waypoints == 0
     looks(law, 20, drifting, 0.62, compensation="robot")
     assert law.around(ball_pose()) is None
 
@@ -244,5 +249,6 @@ def test_explaining_a_moment_before_a_grip_changes_nothing() -> None:
             law.explain("r2", before, sensed)
         # The loop age is shorter, but by too little to make the map invalid.
         law.sense(replace(held, loop_age_s=0.99 * LOOP_S), 0.2)
-        until_s.append(float(law.memory.state["until"][0]))
+        assert law.looking.probes is not None
+        until_s.append(law.looking.probes.full_s)
     assert until_s[0] == until_s[1] == pytest.approx(FULL_S)

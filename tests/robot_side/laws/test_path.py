@@ -14,14 +14,12 @@ from robot_side.arm.port import GripperPose
 from robot_side.field.along import Along
 from robot_side.field.field import Ahead
 from robot_side.field.object_class import OBSTACLE
-from robot_side.laws.memory import Memory
-from robot_side.laws.path import SPACING_M
-from robot_side.laws.prospect import FIELD_PERIOD_S
+from robot_side.laws.gripper_motion import FingerSpeeds
+from robot_side.laws.path import SPACING_M, Drift, Waypoint, at_waypoint, fastest_m_s, times_ahead_s
 from robot_side.overlap import Mesh
 from robot_side.surroundings.perceived import PerceivedObjects
 from robot_side.surroundings.scene_table import scene_table
 from tests.helpers.field.fields import RADIUS_M, ball_pose
-from tests.helpers.field.law_memory import farthest_m_s, fingers_m_s, memory, moments, moved
 from tests.helpers.field.situations import (
     ACCELERATION_M_S2,
     CAMERA_SD_M,
@@ -119,7 +117,7 @@ def test_what_the_fingers_close_towards_is_felt() -> None:
     """Two fingers 80 mm apart close at 70 mm/s. A rod is 20 mm ahead of them and 20 mm inwards of one."""
     objects, law = post(0.02, 0.03, half_m=0.003), swept()
     for tick in range(12):
-        time_s = tick * FIELD_PERIOD_S
+        time_s = 0.01 * tick
         apart_m = 0.05 - 0.07 * time_s
         pose = free_pose([[apart_m, 0.0, 0.0], [-apart_m, 0.0, 0.0]], [RADIUS_M, RADIUS_M])
         sensed = law.sense(situation(pose, objects, loop_age_s=LOOP_S), time_s)
@@ -129,39 +127,38 @@ def test_what_the_fingers_close_towards_is_felt() -> None:
 
 
 def test_fingers_that_rest_do_not_move_however_their_readings_shake() -> None:
-    rng, kept = np.random.default_rng(1), memory(2)
+    rng, fingers = np.random.default_rng(1), FingerSpeeds()
     for tick in range(100):
         centers = np.array([[0.05, 0.0, 0.0], [-0.05, 0.0, 0.0]]) + 5e-5 * rng.standard_normal((2, 3))
-        assert not fingers_m_s(kept, free_pose(centers.tolist(), [RADIUS_M, RADIUS_M]), tick * 0.01).any()
+        assert fingers.measure(free_pose(centers.tolist(), [RADIUS_M, RADIUS_M]), tick * 0.01) is None
 
 
-# Places
+# Waypoints
 
 
-def moving(linear: list[float], turning: list[float], own: FloatArray) -> Memory:
-    kept = memory(len(own))
-    kept.velocity[:], kept.own_m_s[:] = [linear, turning], own
-    return kept
+def moving(linear: list[float], turning: list[float], own: FloatArray | None = None) -> Drift:
+    return Drift(np.array(linear), np.array(turning), own)
 
 
-def test_no_sphere_goes_farther_between_two_places_than_the_spacing() -> None:
+def test_no_sphere_goes_farther_between_two_waypoints_than_the_spacing() -> None:
     pose = free_pose([[0.0, 0.0, 0.0], [0.05, 0.0, 0.1]], [RADIUS_M, RADIUS_M])
-    for drift, turn in ((0.1, 0.0), (0.0, 0.5), (0.08, 0.2), (0.001, 0.0)):
-        kept = moving([drift, 0.0, 0.0], [0.0, turn, 0.0], np.zeros((2, 3)))
-        when_s = moments(kept, pose, 0.8)
-        if drift == 0.001:
+    for drift_m_s, turn in ((0.1, 0.0), (0.0, 0.5), (0.08, 0.2), (0.001, 0.0)):
+        drift = moving([drift_m_s, 0.0, 0.0], [0.0, turn, 0.0])
+        when_s = times_ahead_s(pose, drift, 0.8, 0.0)
+        if drift_m_s == 0.001:
             assert when_s == ()
             continue
         assert when_s[-1] == pytest.approx(0.8)
-        centers = [pose.sphere_centers_m, *(moved(kept, pose, one_s)[2] for one_s in when_s)]
-        # On an arc, places are nearer to each other than computed. About a moving point, the arc is a little longer.
+        there = [at_waypoint(pose, Waypoint(drift, one_s, 0.0), 0.0)[0] for one_s in when_s]
+        centers = [pose.sphere_centers_m, *(one.sphere_centers_m for one in there)]
+        # On an arc, waypoints are nearer to each other than computed. About a moving point, the arc is a little longer.
         assert max(np.linalg.norm(np.diff(centers, axis=0), axis=2).ravel()) <= 1.02 * SPACING_M
 
 
-def test_there_are_no_more_than_eight_places_however_far_apart_they_are() -> None:
+def test_there_are_no_more_than_eight_even_waypoints_however_far_apart_they_are() -> None:
     pose = free_pose([[0.0, 0.0, 0.0]], [RADIUS_M])
     for until_s, count in ((1.19, 8), (3.0, 8), (1.04, 7)):
-        when_s = moments(moving([0.1, 0.0, 0.0], [0.0] * 3, np.zeros((1, 3))), pose, until_s)
+        when_s = times_ahead_s(pose, moving([0.1, 0.0, 0.0], [0.0] * 3), until_s, 0.0)
         assert len(when_s) == count
         np.testing.assert_allclose(np.diff(when_s), until_s / count)
 
@@ -200,39 +197,33 @@ def test_the_path_is_the_exponential_of_the_twist(seed: int, count: int, after_s
     rng = np.random.default_rng(seed)
     pose, turning = random_pose(rng, count), rng.normal(size=3) * (seed % 4 > 0)
     linear, own, ahead_m = rng.normal(size=3), rng.normal(size=(count, 3)), float(rng.normal())
-    kept = moving(linear.tolist(), turning.tolist(), own)
-    tool_m, rotation, centers_m = moved(kept, pose, after_s, ahead_m)
+    drift = Drift(linear, turning, own)
+    there, along = at_waypoint(pose, Waypoint(drift, after_s, after_s), ahead_m)
     turn, way_m = exponential(turning * after_s, linear * after_s + ahead_m * pose.tool_rotation[:, 2])
     lever = pose.sphere_centers_m - pose.tool_position_m
-    np.testing.assert_allclose(tool_m, pose.tool_position_m + way_m, atol=1e-12)
-    np.testing.assert_allclose(rotation, turn @ pose.tool_rotation, atol=1e-12)
-    np.testing.assert_allclose(centers_m, tool_m + (lever + own * after_s) @ turn.T, atol=1e-12)
+    np.testing.assert_allclose(there.tool_position_m, pose.tool_position_m + way_m, atol=1e-12)
+    np.testing.assert_allclose(there.tool_rotation, turn @ pose.tool_rotation, atol=1e-12)
+    expected_m = there.tool_position_m + (lever + own * after_s) @ turn.T
+    np.testing.assert_allclose(there.sphere_centers_m, expected_m, atol=1e-12)
     _, chord = exponential(turning * after_s, pose.tool_rotation[:, 2])
-    np.testing.assert_allclose(kept.chord, chord, atol=1e-12)
+    np.testing.assert_allclose(along, chord, atol=1e-12)
     speeds = [linear + np.cross(turning, one) + own for one in (lever, lever + 0.3 * pose.tool_rotation[:, 2])]
-    assert farthest_m_s(kept, pose, 0.3) == pytest.approx(np.linalg.norm(speeds, axis=2).max(), abs=1e-12)
+    assert fastest_m_s(pose, drift, 0.3) == pytest.approx(np.linalg.norm(speeds, axis=2).max(), abs=1e-12)
 
 
 @settings(derandomize=True, deadline=None, max_examples=20)
 @given(seed=st.integers(0, 2**32 - 1))
 def test_fingers_move_by_the_difference_in_the_tool_frame(seed: int) -> None:
-    rng, kept = np.random.default_rng(seed), memory(5)
+    rng, fingers = np.random.default_rng(seed), FingerSpeeds()
     then, now = random_pose(rng, 5), random_pose(rng, 5)
-    assert not fingers_m_s(kept, then, 1.0).any()
+    assert fingers.measure(then, 1.0) is None
     in_tool = [(pose.sphere_centers_m - pose.tool_position_m) @ pose.tool_rotation for pose in (then, now)]
     expected = (in_tool[1] - in_tool[0]) / 0.05 @ now.tool_rotation.T
-    np.testing.assert_allclose(fingers_m_s(kept, now, 1.05), expected, atol=1e-11)
-    assert not fingers_m_s(kept, then, 1.06, changed=True).any()
-
-
-def test_what_is_known_of_the_fingers_stays_when_more_objects_come() -> None:
-    rng, kept = np.random.default_rng(3), memory(5)
-    then, now = random_pose(rng, 5), random_pose(rng, 5)
-    expected = memory(5)
-    for one in (kept, expected):
-        fingers_m_s(one, then, 1.0)
-    kept.make_room(5, 1000)
-    np.testing.assert_array_equal(fingers_m_s(kept, now, 1.05), fingers_m_s(expected, now, 1.05))
+    found = fingers.measure(now, 1.05)
+    assert found is not None
+    np.testing.assert_allclose(found, expected, atol=1e-11)
+    # Spheres in another number begin anew.
+    assert fingers.measure(random_pose(rng, 6), 1.06) is None
 
 
 # The path against its definition

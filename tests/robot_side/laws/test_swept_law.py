@@ -9,7 +9,7 @@ import pytest
 from common.arrays import FloatArray
 from common.reaction import HORIZON_S
 from robot_side.enlargement.prediction_errors import PredictionErrors
-from robot_side.laws.prospect import BEYOND_M, FIELD_PERIOD_S
+from robot_side.laws.prospect import BEYOND_M
 from robot_side.overlap import sphere_box
 from tests.helpers.field.fields import AHEAD, RADIUS_M, ball_pose
 from tests.helpers.field.situations import (
@@ -53,7 +53,7 @@ def test_nothing_is_claimed_of_what_has_not_been_looked_at() -> None:
     senses = Senses(step_s=0.001)
     near = senses.sense(at(0.0), walls(0.2), loop_age_s=0.1)
     jumped = senses.sense(at(0.004), walls(0.2), loop_age_s=1.0)
-    reach_m = horizon_m(0.1) + 2.0 * FIELD_PERIOD_S * FULL_SPEED_M_S
+    reach_m = horizon_m(0.1) + 0.02 * FULL_SPEED_M_S
     assert near.horizon_m == pytest.approx(horizon_m(0.1))
     assert jumped.horizon_m == pytest.approx(reach_m - 0.004)
     assert jumped.r2.fast_m == (jumped.horizon_m,) * 8

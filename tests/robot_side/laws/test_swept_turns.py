@@ -6,41 +6,32 @@ from typing import Any
 import numpy as np
 import pytest
 
-from common.arrays import FloatArray
-from robot_side.laws.prospect import FIELD_PERIOD_S
 from robot_side.laws.recent_looks import STEADY_S
-from robot_side.tick.sensed import L2, R2, STICK
+from robot_side.tick.sensed import R2
 from tests.helpers.field.fields import EQUAL_M, ball_pose
-from tests.helpers.field.situations import Senses, at, situation, swept, walls
+from tests.helpers.field.situations import Senses, at, moving, situation, swept, walls
 from tests.helpers.gripper_poses import free_pose
 
 # Times of looks
 
+MOVING = moving(np.array([0.0, 0.0, 0.2]))
+
 
 class Watched:
-    """A law that is used tick by tick, with a record of the looks in each tick."""
+    """A law that is used turn by turn."""
 
     def __init__(self) -> None:
-        self.law = swept()
-        self.looks: list[tuple[float, str]] = []
-        self.now_s = 7.0
+        self.law, self.now_s, self.objects = swept(), 7.0, walls(0.1)
 
-    def tick(self, step_s: float, count: int, **changes: Any) -> list[int]:
-        """Run `count` ticks, `step_s` apart; return the number of looks in each."""
+    def turns(self, step_s: float, count: int, **changes: Any) -> list[int]:
+        """Run `count` turns, `step_s` apart; return the number of looks in each."""
         numbers = []
         for _ in range(count):
             self.now_s += step_s
             before = self.law.summary()["fields"]
-            self.law.sense(situation(ball_pose(), walls(0.1), **changes), self.now_s)
+            self.law.sense(replace(situation(ball_pose(), self.objects), **changes), self.now_s)
             numbers.append(self.law.summary()["fields"] - before)
-            looked = np.argwhere(self.law.memory.looked_s == self.now_s)[:, 0].tolist()
-            self.looks += [(self.now_s, {R2: "r2", L2: "l2", STICK: "stick"}[side]) for side in looked]
-            assert len(looked) == numbers[-1]
         return numbers
-
-    def pauses_s(self, side: str) -> FloatArray:
-        times = [when_s for when_s, where in self.looks if where == side]
-        return np.diff(times)
 
 
 @pytest.fixture
@@ -49,41 +40,46 @@ def watched() -> Watched:
 
 
 @pytest.mark.parametrize("lateral", [(0.0, 0.0), (0.5, 0.2)])
-def test_fields_are_looked_at_in_turns_a_hundred_times_a_second(watched: Watched, lateral: tuple[float, float]) -> None:
-    numbers = watched.tick(0.001, 200, lateral=lateral)
-    sides = ["r2", "l2"] + ["stick"] * (lateral != (0.0, 0.0))
-    # The triggers must never be without a field.
-    assert numbers[0] == len(sides)
-    assert max(numbers[1:]) == 1
-    for side in sides:
-        pauses_s = watched.pauses_s(side)
-        assert len(pauses_s) >= 18
-        # The first pause is longer by the tick that measures the motion, and by one tick for each side before this one.
-        assert pauses_s[0] <= FIELD_PERIOD_S + 0.003 + 1e-9
-        np.testing.assert_allclose(pauses_s[1:], FIELD_PERIOD_S, atol=1e-9)
+@pytest.mark.parametrize("step_s", [0.004, 0.005, 0.02, 0.2])
+def test_every_turn_of_a_moving_gripper_looks_along_every_side(
+    watched: Watched, step_s: float, lateral: tuple[float, float]
+) -> None:
+    sides = 2 + (lateral != (0.0, 0.0))
+    assert watched.turns(step_s, 20, joint_velocities_rad_s=MOVING, lateral=lateral) == [sides] * 20
 
 
-@pytest.mark.parametrize("step_s", [0.004, 0.005, 0.012, 0.05])
-def test_no_side_starves_however_late_the_ticks_are(watched: Watched, step_s: float) -> None:
-    watched.tick(step_s, 60, lateral=(1.0, 0.0))
-    for side in ("r2", "l2", "stick"):
-        assert watched.pauses_s(side).max() <= max(3.0 * FIELD_PERIOD_S, step_s) + step_s + 1e-9
+def test_turns_of_a_millisecond_look_no_more_often_than_a_controller_is_written_to(watched: Watched) -> None:
+    assert watched.turns(0.001, 20, joint_velocities_rad_s=MOVING) == [2, 0, 0, 0] * 5
 
 
-def test_a_tick_has_two_looks_where_one_has_waited_too_long_and_all_after_a_long_pause(watched: Watched) -> None:
-    assert watched.tick(0.004, 1, lateral=(1.0, 0.0)) == [3]
-    assert set(watched.tick(0.004, 60, lateral=(1.0, 0.0))) == {0, 1, 2}
-    assert watched.tick(0.06, 1, lateral=(1.0, 0.0)) == [3]
+def test_at_rest_looks_are_rare_until_something_moves(watched: Watched) -> None:
+    assert watched.turns(0.005, 21) == [2, *[0] * 9] * 2 + [2]
+    assert watched.turns(0.005, 3, joint_velocities_rad_s=MOVING) == [2, 2, 2]
 
 
-def test_a_stick_that_is_deflected_is_looked_along_within_a_tick_or_two(watched: Watched) -> None:
-    watched.tick(0.001, 25)
-    assert "stick" not in {side for _, side in watched.looks}
-    watched.tick(0.001, 3, lateral=(0.3, 0.0))
-    assert "stick" in {side for _, side in watched.looks}
-    before = len([1 for _, side in watched.looks if side == "stick"])
-    watched.tick(0.001, 30)
-    assert len([1 for _, side in watched.looks if side == "stick"]) == before
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"lateral": (0.3, 0.0)},
+        {"held": 0},
+        {"compensation": "robot"},
+        {"loop_age_s": 0.11},
+        {"objects": walls(0.1)},
+        {"pose": free_pose([[0.0, 0.0, 0.0]] * 2, [0.008] * 2)},
+    ],
+    ids=lambda changes: str(next(iter(changes))),
+)
+def test_a_change_is_looked_at_in_the_next_turn(watched: Watched, changes: dict[str, Any]) -> None:
+    assert watched.turns(0.004, 3) == [2, 0, 0]
+    looks = watched.turns(0.004, 3, **changes)
+    assert looks[0] >= 2
+    assert looks[1:] == [0, 0]
+
+
+def test_another_probability_is_looked_at_in_the_next_turn(watched: Watched) -> None:
+    assert watched.turns(0.004, 2) == [2, 0]
+    watched.law.expect(0.9)
+    assert watched.turns(0.004, 2) == [2, 0]
 
 
 def test_what_an_object_is_is_worked_out_when_roles_or_the_held_object_change() -> None:
@@ -126,7 +122,6 @@ def test_a_gripper_of_more_spheres_that_is_refused_leaves_the_fingers_at_rest() 
         law.sense(situation(replace(many, tool_position_m=np.full(3, np.nan)), objects), 1.001)
     for tick in range(2, 40):
         found = law.sense(situation(few, objects), 1.0 + 0.001 * tick)
-    assert law.memory.state["moves_fingers"][0] == 0
     np.testing.assert_allclose(found.r2.fast_m, expected.r2.fast_m, atol=EQUAL_M)
 
 

@@ -26,14 +26,14 @@ ABLE: dict[str, Any] = {"full_speed_m_s": FULL_M_S, "acceleration_m_s2": A_M_S2}
 
 def changed(found: Sensed, **changes: Any) -> Sensed:
     same = {name: getattr(found, name) for name in ("l2", "r2", "speed_m_s", "horizon_m", "rumble")}
-    return Sensed.of(**same | changes)
+    return Sensed(**same | changes)
 
 
 def sensed(left_m: float, speed_m_s: float = 0.0, **changes: Any) -> Sensed:
     """Return what the law finds for a wall `left_m` ahead, in the direction of R2, and nothing behind."""
     wall = field(onsets(*(min(left_m + 1e-3 * k, FAR_M) for k in range(8))), **ABLE)
     free = field(onsets(*[FAR_M] * 8), **ABLE)
-    return changed(Sensed.of(free, wall, speed_m_s=speed_m_s, horizon_m=FAR_M), **changes)
+    return changed(Sensed(l2=free, r2=wall, speed_m_s=speed_m_s, horizon_m=FAR_M), **changes)
 
 
 class Run:

@@ -1,0 +1,75 @@
+"""Motion of the gripper, measured: the tool's velocities, and the fingers' motion from recent positions."""
+
+from collections import deque
+from dataclasses import dataclass, field
+from typing import Final
+
+import numpy as np
+
+from common.arrays import FloatArray
+from robot_side.arm.port import GripperPose
+
+_NOISE_M_S: Final = 0.015
+"""Speed up to which the fingers count as at rest, because their position readings are noisy"""
+_FINGERS_S: Final = 0.06
+"""Time over which the fingers' speed is measured"""
+STILL_M_S: Final = 0.002
+_STILL_RAD_S: Final = 0.01
+"""Speed and angular speed up to which the gripper counts as at rest; objects count so up to STILL_M_S"""
+
+
+@dataclass(frozen=True)
+class GripperMotion:
+    """Velocities of the gripper, in the world frame."""
+
+    linear_m_s: FloatArray
+    """(3,) velocity of the tool's point"""
+    turning_rad_s: FloatArray
+    """(3,) angular velocity of the tool"""
+    ahead_m_s: float
+    """Speed of the tool's point along the approach axis"""
+    speed_m_s: float
+    """Speed of the tool's point in any direction"""
+    fingers_m_s: FloatArray | None
+    """(m, 3) velocity of each sphere relative to the tool; None while the fingers rest"""
+
+    @property
+    def moves(self) -> bool:
+        """Whether the gripper or its fingers move."""
+        turns = float(self.turning_rad_s @ self.turning_rad_s) > _STILL_RAD_S**2
+        return turns or self.speed_m_s > STILL_M_S or self.fingers_m_s is not None
+
+
+@dataclass
+class FingerSpeeds:
+    """Positions of all spheres in the tool's frame, of the last 0.06 s."""
+
+    _measured: deque[tuple[float, FloatArray]] = field(default_factory=deque)
+
+    def measure(self, pose: GripperPose, now_s: float) -> FloatArray | None:
+        """Return the velocity (m, 3) of each sphere relative to the tool; None while the fingers rest.
+
+        Spheres that have changed in number begin anew, at rest.
+        """
+        measured = self._measured
+        if measured and len(measured[-1][1]) != len(pose.sphere_centers_m):
+            measured.clear()
+        while measured and measured[0][0] < now_s - _FINGERS_S - 1e-9:
+            measured.popleft()
+        at_m = (pose.sphere_centers_m - pose.tool_position_m) @ pose.tool_rotation
+        measured.append((now_s, at_m))
+        passed_s = now_s - measured[0][0]
+        if passed_s <= 0.0:
+            return None
+        speeds_m_s: FloatArray = ((at_m - measured[0][1]) / passed_s) @ pose.tool_rotation.T
+        return speeds_m_s if np.abs(speeds_m_s).max(initial=0.0) > _NOISE_M_S else None
+
+
+def gripper_motion(
+    pose: GripperPose, joint_velocities_rad_s: FloatArray, fingers_m_s: FloatArray | None
+) -> GripperMotion:
+    """Return the gripper's motion at these rates of the joints (n,)."""
+    twist = pose.tool_jacobian @ joint_velocities_rad_s
+    linear_m_s = twist[:3]
+    ahead_m_s = float(pose.tool_rotation[:, 2] @ linear_m_s)
+    return GripperMotion(linear_m_s, twist[3:], ahead_m_s, float(np.sqrt(linear_m_s @ linear_m_s)), fingers_m_s)
