@@ -9,7 +9,8 @@ from collections.abc import Sequence
 import numpy as np
 
 RESERVOIR_SIZE = 100_000
-"""Number of samples kept for quantiles, so that 100 s at 1 kHz are exact; of more, a uniform random choice is kept."""
+"""Number of samples kept for quantiles, so that 400 s of turns of 4 ms are exact; of more, a uniform random choice is
+kept."""
 BLOCK = 512
 """Number of samples that are processed together."""
 
@@ -136,41 +137,37 @@ def _mean(values: list[float]) -> float:
 
 
 class SlidingQuantile:
-    """Quantile of the newest `window` samples, updated with each.
+    """Quantile of the samples of the last `window_s` seconds, updated with each.
 
     It is the quantile by nearest rank: the least sample that at least the fraction `probability` of the samples does
     not exceed. So of a few samples it is the maximum.
     """
 
-    def __init__(self, window: int = 500, probability: float = 0.95) -> None:
-        if window < 1:
-            raise ValueError(f"window = {window}; valid: a window of 1 sample or more")
+    def __init__(self, window_s: float = 0.5, probability: float = 0.95) -> None:
+        if not window_s > 0.0:
+            raise ValueError(f"window_s = {window_s}; valid: above 0 seconds")
         if not 0.0 < probability <= 1.0:
             raise ValueError(f"probability = {probability}; valid: above 0, up to 1")
-        self._window = window
+        self._window_s = window_s
         self._probability = probability
-        self._rank = math.ceil(probability * window) - 1
-        """Index of the quantile in the sorted samples of a full window"""
-        self._arrivals: deque[float] = deque()
+        self._arrivals: deque[tuple[float, float]] = deque()
         self._sorted: list[float] = []
         self.value: float | None = None
         """Present quantile; None while there are no samples."""
 
-    def update(self, value: float) -> float:
-        """Add the newest sample, forget the oldest of a full window, and return the quantile.
+    def update(self, value: float, now_s: float) -> float:
+        """Add the newest sample, forget those before the window, and return the quantile.
 
         Raises ValueError if the value is not finite.
         """
         if not math.isfinite(value):
             raise ValueError(f"value = {value}; valid: a finite number")
-        arrivals, ordered, rank = self._arrivals, self._sorted, self._rank
-        if len(arrivals) == self._window:
-            del ordered[bisect_left(ordered, arrivals.popleft())]
-        else:
-            rank = math.ceil(self._probability * (len(ordered) + 1)) - 1
-        arrivals.append(value)
+        arrivals, ordered = self._arrivals, self._sorted
+        while arrivals and arrivals[0][0] <= now_s - self._window_s:
+            del ordered[bisect_left(ordered, arrivals.popleft()[1])]
+        arrivals.append((now_s, value))
         insort(ordered, value)
-        self.value = newest = ordered[rank]
+        self.value = newest = ordered[math.ceil(self._probability * len(ordered)) - 1]
         return newest
 
     def clear(self) -> None:

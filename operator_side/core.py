@@ -48,7 +48,8 @@ class OperatorSide:
     ) -> None:
         """listeners: notified of the core's inputs and outputs."""
         self.settings = settings = settings or CoreSettings()
-        self.link = LinkEnd("operator", epoch, clock_domain, settings.seed, settings.asymmetry_s)
+        link = settings.seed, settings.asymmetry_s, settings.tick_period_s
+        self.link = LinkEnd("operator", epoch, clock_domain, *link)
         self.felt = NewestStiffness(settings.seed)
         self.screen: Telemetry | None = None
         """Newest telemetry of the robot side; None before the first."""

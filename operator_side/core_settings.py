@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, field
 
+from common.periods import TURN_S
 from common.protocol.messages import Compensation
 from operator_side.feel.rendering import RenderingSettings
 from operator_side.hands.choices import StickFrame
@@ -26,5 +27,6 @@ class CoreSettings:
     seed: int = 0
     asymmetry_s: float = 0.0
     """Minimum delay to the robot side minus minimum delay to the operator side, in seconds, if known"""
+    tick_period_s: float = TURN_S
     full_rate: bool = False
     """Whether to send a command in every turn of the loop, without waiting for changes"""

@@ -8,7 +8,6 @@ from common.command.status import Status
 from common.emulation.spec import unused_clauses
 from common.loop.loop import Loop
 from common.loop.process import Process
-from common.silence import MOTION_PERIOD_S
 from common.sockets.authentication import OperatorKeys
 from common.sockets.operator import OperatorSockets
 from operator_side.controller.connection import Connection
@@ -32,7 +31,7 @@ def command(arguments: Sequence[str], backend: HidBackend | None = None) -> int:
     settings = parse_settings(OperatorSettings, "feelahead-operator", arguments)
     keys = None if settings.keys is None else OperatorKeys.load(settings.keys, settings.robot_key)
     status = TerminalStatus("operator") if settings.tui else Status(settings.status, "operator")
-    loop = Loop(MOTION_PERIOD_S, REMEDY, settings.seed)
+    loop = Loop(settings.tick_period_s(), REMEDY, settings.seed)
     with Process(settings, "operator", status, OperatorEncoder(), loop) as process:
         # The console first, as its process takes longest to start, and before the priority is raised, which the process
         # would inherit.

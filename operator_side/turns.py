@@ -184,6 +184,7 @@ class OperatorTurns:
             controller=self._connection.state,
             triggers_released=None if controller is None else controller.device.released,
             person=None if self._person is None else self._person.doing,
+            motion_period_ms=1e3 * self._process.loop.pacer.period_s,
             motion_overruns=self._process.loop.pacer.overruns,
             queue_to_robot_ms=self._sending.queue_ms,
         )

@@ -34,7 +34,6 @@ from robot_side.viewing.pictures import Cameras
 from robot_side.viewing.scene_view import SceneView
 from robot_side.viewing.shapes import SceneModel
 
-TICK_PERIOD_S: Final = 1e-3
 _COMPILING: Final = (
     "compiling for this processor, half a minute at the first start (or beforehand: feelahead doctor --compile):"
     " {} of {} kernels are ready"
@@ -66,7 +65,7 @@ def command(arguments: Sequence[str], adapt: Callable[[RobotParts], Adapted] = a
     keys = None if settings.keys is None else RobotKeys.load(settings.keys)
     raise_descriptor_limit()
     open_sockets = partial(RobotSockets, settings.bind, settings.view_bind, insecure=settings.insecure, keys=keys)
-    status, loop = Status(settings.status, "robot"), Loop(TICK_PERIOD_S, _REMEDY, settings.seed)
+    status, loop = Status(settings.status, "robot"), Loop(settings.tick_period_s(), _REMEDY, settings.seed)
     with Process(settings, "robot", status, RobotEncoder(), loop) as process:
         epoch, recording = secrets.randbits(53), process.recording
         # Fail at once for an occupied port; open meanwhile, so that a driver's flag with the same port is named.

@@ -128,6 +128,7 @@ def build_parts(
         settings.motion,
         surroundings,
     )
+    link = settings.seed, settings.asymmetry_s(), settings.tick_period_s()
     late = *prediction_note, *_cover_notes(kinematics.cover, settings.cover_m, held_covers)
     for text in late:
         say(text)
@@ -139,7 +140,7 @@ def build_parts(
         explains=law,
         surroundings=surroundings,
         session=OperatorSession(
-            lambda: LinkEnd("robot", epoch, clock_domain, settings.seed, settings.asymmetry_s()),
+            lambda: LinkEnd("robot", epoch, clock_domain, *link),
             Safety(settings.safety),
             settings.seed,
             Tuning(settings.probability, law.expect if settings.permit_tuning else None),

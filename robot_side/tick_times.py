@@ -67,6 +67,7 @@ class TickTimes:
         return {
             "tick_us": 1e6 * latest_s[len(latest_s) // 2],
             "tick_p99_us": 1e6 * latest_s[len(latest_s) * 99 // 100],
+            "period_ms": 1e3 * self._loop.pacer.period_s,
             "overruns": self._loop.pacer.overruns,
             "late_us": 1e6 * self._loop.pacer.take_latest_s(),
             "real_time": share,

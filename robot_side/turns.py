@@ -70,12 +70,11 @@ class RobotTurns:
 
     def take(self, received: Sequence[tuple[bytes, bytes]], now_s: float) -> None:
         """Give the payloads that are admitted to the core."""
-        for peer, payload in self._admission.admitted(received, self._core.session.owner_peer):
+        for peer, payload in self._admission.admitted(received, self._core.session.owner_peer, now_s):
             self._core.receive(peer, payload, now_s)
 
     def turn(self, now_s: float) -> None:
         """Run one tick and queue its messages."""
-        self._admission.begin_tick()
         began = self._times.begin()
         self._core.reports.felt.interval_s = self._sending.budget.haptic_interval_s
         outgoing = self._core.tick(now_s)

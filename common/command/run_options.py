@@ -9,11 +9,24 @@ import tyro
 from common.command.status import StatusMode
 from common.emulation.clauses import LinkModel
 from common.emulation.spec import LinkSpec
+from common.errors import ConfigurationError
 from common.files.output_file import require_output_file
+from common.periods import PERIODS_S, TURN, period_text
 from common.recording.side import require_recordable
 from common.units import parse_duration
 
 _LARGEST_ASYMMETRY_S = 10.0
+TickPeriod = Annotated[str, tyro.conf.arg(metavar="TIME")]
+"""Period of a side's turns, such as 4ms; `tick_period_s` checks it"""
+
+
+def tick_period_s(text: str) -> float:
+    """Return the period in seconds; ConfigurationError names --tick-period if it is no time or out of range."""
+    period_s = parse_duration(text, "--tick-period")
+    if not PERIODS_S[0] <= period_s <= PERIODS_S[-1]:
+        valid = f"{period_text(PERIODS_S[0])} to {period_text(PERIODS_S[-1])}"
+        raise ConfigurationError(f"--tick-period {text}: is out of range; valid: {valid}")
+    return period_s
 
 
 @dataclass(frozen=True)
@@ -34,9 +47,12 @@ class RunOptions:
     asymmetry: Annotated[str, tyro.conf.arg(metavar="TIME")] = "0ms"
     """Least delay to the robot side minus least delay to the operator side (12ms or -12ms), if known from elsewhere.
     The sides' messages cannot show it, and half of it would enter the estimated clock offset as an error."""
+    tick_period: TickPeriod = TURN
+    """Period of this side's turns, 1ms to 20ms. A machine that cannot keep it takes a longer one by itself, and says
+    so. The physics keeps the model's timestep."""
     full_rate: bool = False
-    """For comparison, send a stiffness every millisecond and 250 commands a second. Otherwise messages are sent only
-    if they change what is felt or commanded, and at least 50 a second."""
+    """For comparison, send a stiffness and a command in every turn. Otherwise messages are sent only if they change
+    what is felt or commanded, and at least 50 a second."""
     duration: Annotated[float | None, tyro.conf.arg(metavar="SECONDS")] = None
     """End after so many seconds; by default the run ends at Ctrl-C."""
     seed: Annotated[int, tyro.conf.arg(metavar="N")] = 0
@@ -56,6 +72,7 @@ class RunOptions:
                 f"--asymmetry {self.asymmetry}: is out of range;"
                 f" valid: -{_LARGEST_ASYMMETRY_S:g}s to {_LARGEST_ASYMMETRY_S:g}s"
             )
+        self.tick_period_s()
         if self.duration is not None and not 0.0 < self.duration < 1e6:
             raise ValueError(f"--duration {self.duration}: is out of range; valid: above 0 and below 1000000 seconds")
         if self.seed < 0:
@@ -66,6 +83,10 @@ class RunOptions:
     def link_spec(self) -> LinkSpec:
         """Return the emulated link with this run's seed; raises ConfigurationError if `link` is invalid."""
         return LinkSpec.parse(self.link, max(0, self.seed), self.link_model)
+
+    def tick_period_s(self) -> float:
+        """Return `tick_period` in seconds; raises ConfigurationError if it is no time or out of range."""
+        return tick_period_s(self.tick_period)
 
     def asymmetry_s(self) -> float:
         """Return `asymmetry` in seconds, positive or negative; raises ConfigurationError if it is no time."""

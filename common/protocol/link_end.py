@@ -5,6 +5,7 @@ from collections import deque
 from dataclasses import dataclass
 from typing import Any, Literal
 
+from common.periods import TURN_S
 from common.protocol.messages import AnyMessage, Header, Hello
 from common.rate.outgoing_queue import OutgoingQueue
 from common.silence import counted_s
@@ -51,8 +52,12 @@ class LinkEnd:
         clock_domain: str,
         seed: int = 0,
         asymmetry_s: float = 0.0,
+        turn_s: float = TURN_S,
     ) -> None:
-        """`asymmetry_s`: least delay to the robot minus least delay to the operator, if known from elsewhere."""
+        """`asymmetry_s`: least delay to the robot minus least delay to the operator, if known from elsewhere.
+
+        turn_s: period of turns, which the peer is taken to have, too.
+        """
         self.delay = RunningStatistics(seed)
         """One-way delays from the peer in seconds, of all arrivals since the offset settled, fresh or not."""
         self.round_trip = RunningStatistics(seed)
@@ -65,6 +70,7 @@ class LinkEnd:
         """Number of messages that were older than the newest of their kind, or not of the peer's present epoch."""
         self.gaps = 0
         """Number of silences of more than 100 ms between two messages, each newer than all before."""
+        self.turn_s = turn_s
         self._side = side
         self._epoch = epoch
         self._clock_domain = clock_domain
@@ -169,7 +175,7 @@ class LinkEnd:
             self.clock_offset.update(header.last_sent_s, header.sent_s, header.last_held_s, now_s)
         if self.clock_offset.round_trip_s is not None:
             self.round_trip.add(self.clock_offset.round_trip_s)
-        return max(0.0, now_s - sent_s - held_s) + counted_s(held_s)
+        return max(0.0, now_s - sent_s - held_s) + counted_s(held_s, self.turn_s)
 
     def _measure_one_way(self, sent_s: float, now_s: float) -> float | None:
         if self.clock_offset.jumps != self._jumps:

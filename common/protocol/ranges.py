@@ -1,4 +1,4 @@
-"""Checks of ranges by hand, for messages made up to 1000 times a second: `check_limits` takes four times as long."""
+"""Checks of ranges by hand, for messages made hundreds of times a second: `check_limits` takes four times as long."""
 
 import math
 from collections.abc import Iterable

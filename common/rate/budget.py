@@ -127,7 +127,7 @@ class Budget(Generic[Name]):
             one.held_back["rate" if self.controller.may_send(now_s) else "queue"] += 1
 
     def take(self, now_s: float) -> list[Leaving[Name]]:
-        """Return the payloads of paced streams to send at `now_s`. Call it about every millisecond."""
+        """Return the payloads of paced streams to send at `now_s`. Call it in every turn."""
         self._fill(now_s)
         leaving: list[Leaving[Name]] = []
         for name, stream in self._streams.items():

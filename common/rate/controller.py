@@ -216,7 +216,7 @@ class RateController:
         return self._draining is not None
 
     def update(self, now_s: float, *, limited: bool) -> None:
-        """Let the rate grow while it limits what we send. Call it every few milliseconds.
+        """Let the rate grow while it limits what we send. Call it in every turn.
 
         limited: messages wait because of the rate. Otherwise too little is sent to test a higher rate.
         """

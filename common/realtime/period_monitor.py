@@ -1,23 +1,24 @@
-"""Check that a loop keeps its period; if it does not, one sentence per run names the cause and a remedy."""
+"""Check that a loop keeps its period. If it does not, a longer one is taken, and a sentence names cause and remedy."""
 
 from collections.abc import Callable
 from typing import Any, Final
 
 from common.clock import Clock
+from common.periods import period_text
 from common.realtime.pacing import Pacer
+from common.realtime.period_choice import PeriodChoice
 from common.realtime.stolen_time import StolenTime, read_stolen_time
 
-WINDOW_S: Final = 5.0
-_LEFT_OUT: Final = 0.05
-"""Share of left-out turns above which the period counts as not kept; single ones occur on every machine."""
 _FULL: Final = 0.8
 """Mean computing time of a turn, as a share of the period, from which on the machine counts as too slow."""
 _UNDISTURBED: Final = 1.25
 """Ratio of wall time to processor time below which turns count as undisturbed by other programs."""
+_TAKEN: Final = 0.05
+"""Share of time from which on other programs, or the host, count as a cause"""
 
 
 class PeriodMonitor:
-    """Monitor of one loop, which judges windows of 5 s; the pacer's overruns are the turns left out."""
+    """Monitor of one loop, which changes the pacer's period when `PeriodChoice` does."""
 
     def __init__(
         self,
@@ -29,34 +30,43 @@ class PeriodMonitor:
     ) -> None:
         """remedy: what would shorten the loop's turns."""
         self.said: str | None = None
-        """The sentence about a period that was not kept; None before."""
+        """First sentence about a period that was not kept; None before."""
         self._pacer, self._wall, self._processor, self._remedy, self._taken = pacer, wall, processor, remedy, taken
+        self._choice = PeriodChoice(pacer.period_s)
         self._began_s = self._computed_s = 0.0
+        self._turn_s = 0.0
+        """Wall time of the loop's work since the last turn, without waiting"""
         self._worked_s = [0.0, 0.0]
-        """Wall time and processor time of the loop's work in this window, without waiting."""
+        """Wall time and processor time of the loop's work in this window"""
         self._first: tuple[float, StolenTime] | None = None
-        self._window: tuple[float, StolenTime, int, int] | None = None
+        self._window: tuple[float, StolenTime, int] | None = None
 
     def begin(self) -> None:
         """Note that the loop begins to work, after waiting."""
         self._began_s, self._computed_s = self._wall.now(), self._processor.now()
 
     def end(self, *, turned: bool) -> str | None:
-        """Note that the loop begins to wait. `turned`: it has taken a turn. Return the sentence, at most once a run."""
+        """Note that the loop begins to wait. `turned`: it has taken a turn. Return a sentence when one is due.
+
+        One is due when the period changes, and the first time that even the longest period is not kept.
+        """
         now_s = self._wall.now()
+        self._turn_s += now_s - self._began_s
         self._worked_s[0] += now_s - self._began_s
         self._worked_s[1] += self._processor.now() - self._computed_s
         if not turned:
             return None
-        if self._window is not None and now_s - self._window[0] < WINDOW_S:
+        pacer, choice = self._pacer, self._choice
+        if self._window is None:
+            self._window = now_s, self._taken(), pacer.turns - 1
+            self._first = self._window[:2]
+        judged = choice.turned(pacer.late_s, self._turn_s, pacer.missed, now_s)
+        self._turn_s = 0.0
+        if not judged:
             return None
-        said, before = None, self._window
-        taken = self._taken()
-        if before is not None and self.said is None:
-            self.said = said = self._judge(now_s, taken, *before)
-        if self._first is None:
-            self._first = now_s, taken
-        self._window = now_s, taken, self._pacer.turns, self._pacer.overruns
+        taken, before = self._taken(), self._window
+        said = self._judge(now_s, taken, *before)
+        self._window = now_s, taken, pacer.turns
         self._worked_s = [0.0, 0.0]
         return said
 
@@ -68,28 +78,34 @@ class PeriodMonitor:
             waited, stolen = self._taken().shares_since(taken, self._wall.now() - since_s)
         return {"said": self.said, "waited": waited, "stolen": stolen}
 
-    def _judge(
-        self, now_s: float, taken: StolenTime, since_s: float, before: StolenTime, turns: int, overruns: int
-    ) -> str | None:
-        turns, overruns = self._pacer.turns - turns, self._pacer.overruns - overruns
-        if turns == 0 or overruns <= _LEFT_OUT * (turns + overruns):
-            return None
-        wall_s, computed_s = (worked_s / turns for worked_s in self._worked_s)
+    def _judge(self, now_s: float, taken: StolenTime, since_s: float, before: StolenTime, turns: int) -> str | None:
+        choice, period_s = self._choice, self._pacer.period_s
+        if choice.period_s != period_s:
+            self._pacer.change(choice.period_s)
+        if choice.kept:
+            return f"turns begin every {period_text(choice.period_s)} again" if choice.period_s < period_s else None
+        missed = f"{100.0 * choice.missed:.0f} % of the deadlines are missed"
+        then = f": turns now begin every {period_text(choice.period_s)}" if choice.period_s > period_s else ""
+        if self.said is not None:
+            return f"{missed}{then}" if then else None
+        wall_s, computed_s = (worked_s / (self._pacer.turns - turns) for worked_s in self._worked_s)
         waited, stolen = taken.shares_since(before, now_s - since_s)
-        lost = max(waited or 0.0, stolen or 0.0)
-        left_out = f"{100.0 * overruns / (turns + overruns):.0f} % of the turns are left out"
-        undisturbed = wall_s < _UNDISTURBED * computed_s and lost < _LEFT_OUT
-        if computed_s >= _FULL * self._pacer.period_s or undisturbed:
-            return (
-                f"this machine is too slow: a turn computes for {1e3 * computed_s:.2g} ms where there are"
-                f" {1e3 * self._pacer.period_s:.2g} ms, and {left_out}; {self._remedy} would help"
-            )
+        cause, remedy = self._cause(wall_s, computed_s, period_s, waited, stolen)
+        self.said = f"{cause}, and {missed}{then}; {remedy} would help"
+        return self.said
+
+    def _cause(
+        self, wall_s: float, computed_s: float, period_s: float, waited: float | None, stolen: float | None
+    ) -> tuple[str, str]:
+        """Return why a period is not kept, and a remedy; wall_s, computed_s: means of a turn."""
+        undisturbed = wall_s < _UNDISTURBED * computed_s and max(waited or 0.0, stolen or 0.0) < _TAKEN
+        if computed_s >= _FULL * period_s or undisturbed:
+            where = f"computes for {1e3 * computed_s:.2g} ms where there are {1e3 * period_s:.2g} ms"
+            return f"this machine is too slow: a turn {where}", self._remedy
         whose = "closing other programs, or --realtime,"
-        if stolen is not None and stolen > max(waited or 0.0, _LEFT_OUT):
+        if stolen is not None and stolen > max(waited or 0.0, _TAKEN):
             whose = f"its host took {100.0 * stolen:.0f} % of the time: a host with less to do"
-        elif waited is not None and waited > _LEFT_OUT:
+        elif waited is not None and waited > _TAKEN:
             whose = f"others had the processor for {100.0 * waited:.0f} % of the time: {whose}"
-        return (
-            f"this machine is too busy: a turn lasts {1e3 * wall_s:.2g} ms and computes for {1e3 * computed_s:.2g} ms,"
-            f" and {left_out}; {whose} would help"
-        )
+        times = f"lasts {1e3 * wall_s:.2g} ms and computes for {1e3 * computed_s:.2g} ms"
+        return f"this machine is too busy: a turn {times}", whose

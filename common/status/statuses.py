@@ -71,10 +71,13 @@ class RobotStatus(SideStatus, frozen=True, kw_only=True):
     """Distance from the gripper's surface to the nearest object"""
     target_mm: float | None = None
     tick_us: float | None = None
-    """This field and the next four are of the ticks since the previous status. They are known only if the side runs in
+    """This field and the next five are of the ticks since the previous status. They are known only if the side runs in
     its own process"""
     tick_p99_us: float | None = None
+    period_ms: float | None = None
+    """Present period of the robot side's turns: the one asked for, or a longer one if the machine cannot keep it"""
     overruns: int | None = None
+    """Number of missed deadlines of turns, since the start"""
     late_us: float | None = None
     real_time: float | None = None
     """Speed of the simulation, as a share of real time"""
@@ -107,6 +110,8 @@ class OperatorStatus(SideStatus, frozen=True, kw_only=True):
     triggers_released: bool | None = None
     person: Doing | None = None
     """Action of the simulated person or of the page that drives"""
+    motion_period_ms: float | None = None
+    """Present period of the operator side's turns"""
     motion_overruns: int | None = None
     queue_to_robot_ms: float | None = None
 

@@ -20,7 +20,7 @@ class LoopAge:
         self,
         worst_case_s: float,
         probability: float = 0.95,
-        window: int = 500,
+        window_s: float = 0.5,
         time_constant_s: float = 0.5,
     ) -> None:
         for name, seconds in (("worst_case_s", worst_case_s), ("time_constant_s", time_constant_s)):
@@ -28,7 +28,7 @@ class LoopAge:
                 raise ValueError(f"{name} = {seconds}; valid: a finite time above 0 s")
         self._worst_case_s = worst_case_s
         self._time_constant_s = time_constant_s
-        self._quantile = SlidingQuantile(window, probability)
+        self._quantile = SlidingQuantile(window_s, probability)
         self._held_s = worst_case_s
         self._held_since_s = 0.0
         self._known_since_s = math.inf
@@ -43,7 +43,7 @@ class LoopAge:
         before_s = self.value(now_s)
         if not self.known:
             self._known_since_s = now_s
-        self._held_s = max(before_s, self._quantile.update(age_s))
+        self._held_s = max(before_s, self._quantile.update(age_s, now_s))
         self._held_since_s = now_s
         return self._held_s
 

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any, Final, Literal
 
 from common.emulation.clauses import LinkModel
+from common.periods import TURN
 from common.protocol.around import Around
 from common.protocol.uniform_field import uniform_field
 from common.roles import Role
@@ -23,7 +24,6 @@ from robot_side.drivers.mujoco.robot_model import SiteAxis
 from robot_side.drivers.mujoco.scene import load_scene
 from robot_side.drivers.mujoco.true_contact import TrueContact
 from robot_side.laws.law import Law
-from robot_side.main import TICK_PERIOD_S
 from robot_side.outcome.placing import Placing
 from robot_side.settings import CameraSettings, RobotSettings
 from robot_side.tick.events import Listener
@@ -54,8 +54,8 @@ class Trial:
     person: PersonSettings
     duration_s: float
     link_model: LinkModel = "datagram"
-    tick_period_s: float = TICK_PERIOD_S
-    """Period of the robot side's ticks"""
+    tick_period: str = TURN
+    """Period of both sides' turns, such as 4ms"""
     camera_sd_m: float = CameraSettings().sd_m
     """Standard deviation of the camera's error along each axis; the law knows it"""
     probability: float = RobotSettings().probability
@@ -106,6 +106,7 @@ class Watch(Listener):
         robot = RobotSettings(
             link=trial.link,
             link_model=trial.link_model,
+            tick_period=trial.tick_period,
             seed=seed,
             scene=trial.scene if trial.model is None else None,
             model=trial.model,
@@ -117,6 +118,7 @@ class Watch(Listener):
         operator = OperatorSettings(
             link=trial.link,
             link_model=trial.link_model,
+            tick_period=trial.tick_period,
             seed=seed,
             haptics=trial.arm != "off",
             person=trial.person if trial.arm == "reacting" else replace(trial.person, trust=0.0),
@@ -126,7 +128,6 @@ class Watch(Listener):
             LoopbackSettings(robot, operator),
             parts=replace(parts, law=_Silent(parts.law)) if trial.arm == "off" else parts,
             listeners=[self],
-            tick_period_s=trial.tick_period_s,
         )
 
     def on_sent(self, now_s: float) -> None:

@@ -13,7 +13,6 @@ from common.emulation.delay_line import DelayLine, link_summary
 from common.emulation.spec import Stream
 from common.emulation.tuned import tuned_link
 from common.protocol.messages import Telemetry
-from common.silence import MOTION_PERIOD_S
 from common.statistics import RunningStatistics, microseconds
 from feelahead.both_sides.summary import merge_summaries
 from operator_side import events as operator_events
@@ -29,7 +28,6 @@ from robot_side.compiled.warm_up import warm_up
 from robot_side.core.robot_parts import RobotParts
 from robot_side.core.robot_side import RobotSide
 from robot_side.drivers.mujoco.scene import Scene
-from robot_side.main import TICK_PERIOD_S
 from robot_side.parts import SceneParts, build_parts
 from robot_side.settings import RobotSettings
 from robot_side.tick import events as robot_events
@@ -75,14 +73,11 @@ class Loopback:
         pages: DrivingPage | None = None,
         listeners: Sequence[robot_events.Listener] = (),
         operator_listeners: Sequence[operator_events.Listener] = (),
-        tick_period_s: float = TICK_PERIOD_S,
     ) -> None:
         """parts: the robot side's parts, instead of those that the settings give (see `robot_parts`).
 
         device: the simulated controller; a new one if None. person: makes the person who holds it; the scripted person
         if None. pages: the console's pages, from which an emergency stop or tuning may come.
-        tick_period_s: period of the robot side's ticks. The steps of the physics do not depend on it, and the law
-        evaluates each trigger at most every 10 ms.
         listeners, operator_listeners: receive the events of the robot side's and the operator side's core.
         """
         self.clock = VirtualClock()
@@ -104,7 +99,7 @@ class Loopback:
                 swap_sides=settings.operator.swap_sides,
             )
         )
-        self._tick_period_s = tick_period_s
+        self._tick_s, self._motion_s = settings.robot.tick_period_s(), settings.operator.tick_period_s()
         self.tick_time = RunningStatistics(settings.robot.seed)
         self._there, self._back = settings.operator.link_spec(), settings.robot.link_spec()
         self._to_robot: DelayLine[bytes] = DelayLine(self._there.profile("to_robot"))
@@ -119,10 +114,10 @@ class Loopback:
         while (due_s := self._next_event()) <= end_s:
             self.clock.advance_to(due_s)
             self._deliver(due_s)
-            if due_s >= self._motions * MOTION_PERIOD_S:
+            if due_s >= self._motions * self._motion_s:
                 self._motions += 1
                 self._operator_tick(due_s)
-            if due_s >= self._ticks * self._tick_period_s:
+            if due_s >= self._ticks * self._tick_s:
                 self._ticks += 1
                 self._robot_tick(due_s)
             self._deliver(due_s)
@@ -141,7 +136,7 @@ class Loopback:
         return merged
 
     def _next_event(self) -> float:
-        dues = [self._ticks * self._tick_period_s, self._motions * MOTION_PERIOD_S]
+        dues = [self._ticks * self._tick_s, self._motions * self._motion_s]
         dues += [due for line in (self._to_robot, *self._to_operator.values()) if (due := line.next_due()) is not None]
         # The clock must not go back for a message whose time has just passed.
         return max(min(dues), self.clock.now())

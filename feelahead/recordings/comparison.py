@@ -133,6 +133,11 @@ def require_side(recording: Recording, side: str) -> Mapping[str, Any]:
         raise ConfigurationError(
             f"{recording.path}: the header lacks the {side} side's {missing[0]}; valid: a whole recording"
         )
+    if "tick_period" not in header["settings"]:
+        raise ConfigurationError(
+            f"{recording.path}: recorded by an earlier version, as its settings lack tick_period: its {side} side"
+            " cannot be replayed; what works: feelahead replay without --check, export, plot"
+        )
     return header
 
 

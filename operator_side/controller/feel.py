@@ -42,7 +42,7 @@ class Rumble(Limited):
 
 def _check_strengths(name: str, strengths: object) -> None:
     try:
-        # At 1 kHz: `bytes` takes whole numbers only, and is quick.
+        # In every turn: `bytes` takes whole numbers only, and is quick.
         valid = isinstance(strengths, tuple) and len(strengths) == ZONE_COUNT and max(bytes(strengths)) <= MAX_STRENGTH
     except (TypeError, ValueError):
         valid = False

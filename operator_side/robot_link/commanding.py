@@ -4,10 +4,11 @@ import math
 from operator import attrgetter
 from typing import Any, Final, NamedTuple
 
+from common.periods import EARLY, TURN_S
 from common.protocol.codec import encode
 from common.protocol.link_end import LinkEnd
 from common.protocol.messages import Compensation, MotionCommand, MotionState
-from common.silence import LONGEST_HELD_S, MOTION_PERIOD_S
+from common.silence import LONGEST_HELD_S
 from operator_side.hands.intent import OperatorIntent
 
 STOP_HELD_S: Final = 0.2
@@ -16,8 +17,6 @@ HEARTBEAT_PERIOD_S: Final = 0.2
 """Seconds between Hellos while no command is sent. The first opens the session; later ones keep it open."""
 _NOTICED: Final = 0.01
 """Maximum change of a travel or a deflection that need not be sent at once; sensor noise is below it"""
-_LATEST_S: Final = LONGEST_HELD_S - MOTION_PERIOD_S / 2.0
-"""Seconds since the last command after which the next is sent: in the turn nearest to `LONGEST_HELD_S`"""
 STOPPING: Final = OperatorIntent(emergency_stop=True)
 """Intent while a stop is held, whatever the controller's inputs are"""
 
@@ -65,7 +64,8 @@ class StopButton:
 class HeldCommand:
     """Last command sent, which the robot side holds until the next one (zero-order hold); decides when the next is due.
 
-    A change of travel or deflection of at most 0.01 is sent with the next command, at most 16 ms later.
+    A change of travel or deflection of at most 0.01 is sent with the next command, at most 16 ms later. In turns
+    shorter than 4 ms a larger one waits until 4 ms after the last command.
     """
 
     def __init__(self, *, full_rate: bool = False) -> None:
@@ -77,19 +77,22 @@ class HeldCommand:
         """Note that the robot side holds no command of ours, so that the next one is sent at once."""
         self._pressed: tuple[float, ...] = ()
         self._moved: tuple[float, ...] = ()
-        self._sent_s = -math.inf
+        self._sent_s = self._turned_s = -math.inf
 
     def due(self, intent: OperatorIntent, token: int, now_s: float) -> ToRobot | None:
         """Return a message without payload, for the caller to fill; None if the command may wait.
 
-        A command is due at once if a button or the lease's token has changed, if a travel or deflection has changed by
-        more than 0.01, or if all have come to rest.
+        A command is due at once if a button or the lease's token has changed, or if all have come to rest; if a travel
+        or deflection has changed by more than 0.01; else in the last turn that is not too late for LONGEST_HELD_S.
         """
+        turn_s, self._turned_s = now_s - self._turned_s, now_s
         pressed = (*_PRESSED(intent), intent.gripper, token)
         moved = (intent.l2, intent.r2, *intent.lateral, *intent.turning)
         changed, rests = pressed != self._pressed, moved != self._moved and not any(moved)
-        at_once = self._full_rate or changed or rests or now_s - self._sent_s > _LATEST_S
-        if not at_once and all(abs(now - held) <= _NOTICED for now, held in zip(moved, self._moved, strict=True)):
+        waits = now_s - self._sent_s + EARLY * turn_s < LONGEST_HELD_S
+        at_once = self._full_rate or changed or rests or not waits
+        early = now_s - self._sent_s + (1.0 - EARLY) * turn_s < TURN_S
+        if not at_once and (early or all(abs(a - b) <= _NOTICED for a, b in zip(moved, self._moved, strict=True))):
             return None
         self._pressed, self._moved, self._sent_s = pressed, moved, now_s
         return ToRobot(b"", everywhere=changed or rests or intent.emergency_stop)

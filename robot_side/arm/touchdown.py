@@ -26,7 +26,6 @@ _STALLED_S: Final = 0.15
 the commanded speed. An arm needs less time to begin to move."""
 _SINKS_M_S: Final = 1e-3
 _LEAVES_M: Final = 3e-3
-_PERIOD_S: Final = 0.004
 _GIVES_WAY_S: Final = 0.01
 """Time, in seconds, for which the arm halts at its measured position: longer than a step of physics or
 of a controller"""
@@ -57,10 +56,6 @@ class Touchdown:
         self._since_s = self._time_s = -math.inf
         self._height_m = self._sinks_m_s = self._stalled_s = 0.0
         self._carried_n = self._usual_n = 0.0
-
-    def due(self, time_s: float) -> bool:
-        """Return whether `update` needs a load at `time_s`: every 4 ms, as computing a load takes a tenth of a tick."""
-        return time_s - self._time_s >= _PERIOD_S
 
     @property
     def gives_way(self) -> bool:

@@ -1,7 +1,7 @@
 """Way home: a straight line between joint positions to the arm's start pose, free as far as objects are perceived.
 
 waiting ─▶ checking ─▶ moving ─▶ home
-              │           │        the arm stands until all of the way has been looked at, one place in a tick;
+              │           │        the arm stands until all of the way has been looked at, a place each millisecond;
               └─────┬─────┘        while it moves, what is left of the way is looked at again and again
                 refused            until the button is released
 """
@@ -27,7 +27,11 @@ CLEAR_M: Final = 0.01
 """Distance beyond the enlargement within which something may be touched"""
 _STEP_RAD: Final = 0.04
 """Largest motion of a joint between two places that are looked at"""
-_AGAIN_TICKS: Final = 5
+_LOOK_S: Final = 0.001
+_AGAIN_S: Final = 0.005
+_MOST_S: Final = 0.02
+"""Time from the look at a place to that at the next, in s: at first, and while the arm moves; longest time whose looks
+are made up for"""
 _RATE_RAD_S: Final = 0.4
 _SPEED_M_S: Final = 0.125
 """Largest rate of a joint and speed of the tool on the way home, at full speed scale"""
@@ -60,7 +64,7 @@ class Homing:
         self._refused: str | None = None
         self._clear_m = math.nan
         self._near_m: dict[str, float] = {}
-        self._place = self._ticks = 0
+        self._place, self._next_s = 0, -math.inf
         self._free = False
 
     def follow(
@@ -85,18 +89,18 @@ class Homing:
         if math.isnan(self._clear_m):
             if not still:
                 return np.zeros(self._home_rad.size)
-            self._clear_m = CLEAR_M + enlargement_m
+            self._clear_m, self._next_s = CLEAR_M + enlargement_m, state.time_s
             self._note_near(state, grip, objects)
-        self._look(state, grip, objects)
-        if self._refused is not None:
-            return self._refused
+        self._next_s = max(self._next_s, state.time_s - _MOST_S)
+        while self._next_s <= state.time_s:
+            self._look(state, grip, objects)
+            if self._refused is not None:
+                return self._refused
+            self._next_s += _AGAIN_S if self._free else _LOOK_S
         return self._velocity(state, command.home) if self._free else np.zeros(self._home_rad.size)
 
     def _look(self, state: ArmState, grip: Grip, objects: PerceivedObjects) -> None:
         """Look at the next place on the way, and begin again once all were free."""
-        self._ticks += 1
-        if self._free and self._ticks % _AGAIN_TICKS > 0:
-            return
         left_rad = self._home_rad - state.joint_positions_rad
         places = max(1, math.ceil(np.abs(left_rad).max(initial=0.0) / _STEP_RAD))
         self._place = min(self._place, places)

@@ -47,7 +47,7 @@ class Grip:
             index = gripped_object(self._surroundings.see(objects), pose.tool_position_m, state.gripper_opening_m)
             if index is not None:
                 self.held = grip(objects, index, pose, self._covers)
-        if self.held is not None and self.touchdown.due(state.time_s):
+        if self.held is not None:
             carried = carried_n(pose.tool_jacobian, state.joint_loads_nm)
             self.touchdown.update(carried, float(pose.tool_position_m[2]), rises_m_s, state.time_s)
 

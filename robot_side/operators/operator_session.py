@@ -170,7 +170,9 @@ class OperatorSession:
 
         Of a silence, the peer's or ours, only a part counts (common/silence.py).
         """
-        return None if self._loop_age_s is None else self._loop_age_s + counted_s(now_s - self._accepted_s)
+        if self._loop_age_s is None:
+            return None
+        return self._loop_age_s + counted_s(now_s - self._accepted_s, self._owner_link.turn_s)
 
     def permission(self, now_s: float) -> Permission:
         """Return the command that may reach the arm in this tick, if any."""

@@ -1,6 +1,6 @@
 """Exact overlap volumes of spheres with solids and their gradients; `warm_up` compiles the kernels beforehand.
 
-The public functions are in `volumes` and `meshes.mesh`; faster ones for a 1 kHz tick, without checks, in `kernels`.
+The public functions are in `volumes` and `meshes.mesh`; faster ones for a tick, without checks, in `kernels`.
 `solids.face_angles` explains the method, which `solids.tetrahedron_lane` and `solids.box_lane` use.
 `precise.polyhedron` computes overlaps that are too small for it. The batches compute 64 pairs at a time.
 """

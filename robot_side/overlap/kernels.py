@@ -1,4 +1,4 @@
-"""Overlaps of (sphere, primitive) pairs in contiguous arrays, for calls in a 1 kHz tick.
+"""Overlaps of (sphere, primitive) pairs in contiguous arrays, for calls in a tick.
 
 The caller guarantees equal numbers of rows, finite values, radii >= 0, rotations that are orthonormal to 1e-6, and
 normals other than 0. With `trusted=False` the values are checked, except the numbers of rows: a wrong value raises

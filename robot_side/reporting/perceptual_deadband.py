@@ -18,6 +18,7 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from common.following import follow
+from common.periods import EARLY
 from common.protocol.messages import MotionCommand, MotionState, Telemetry, TriggerField
 from common.reaction import WRITE_S
 from common.silence import KEEP_ALIVE_S
@@ -27,8 +28,6 @@ _DEADBAND_M: Final = 1e-3
 _DEADBAND_SHARE: Final = 0.02
 _NEARER: Final = 0.25
 """Share of the deadband above which a distance that became shorter is sent at once"""
-_HALF_A_TICK_S: Final = 0.5e-3
-"""Tolerance of a deadline, in seconds: half a tick, so that the nearest tick counts"""
 _EIGHTHS: Final = 8.0
 
 
@@ -94,8 +93,10 @@ class StiffnessDeadband:
             by_operator = command.compensation == "operator"
         belief, states = self._belief, (state, stands, hindered)
         if belief is not None:
+            early_s = EARLY * (now_s - belief.now_s)
             belief.advance(now_s)
-            if not self._full_rate and not _matters(belief, sensed, states, by_operator, self.interval_s, now_s):
+            waits = by_operator, self.interval_s, now_s + early_s
+            if not self._full_rate and not _matters(belief, sensed, states, *waits):
                 # The receiver does not know yet how fast the arm follows a later command.
                 later_m_s = travel * belief.sensed.r2.full_speed_m_s
                 belief.target_m_s = belief.commanded_m_s if obeyed == belief.obeyed else later_m_s
@@ -112,7 +113,8 @@ def _matters(
     interval_s: float,
     now_s: float,
 ) -> bool:
-    since_s, sent = now_s - belief.sent_s + _HALF_A_TICK_S, belief.sensed
+    """Return whether a message is due at `now_s`, which includes the tolerance of a deadline."""
+    since_s, sent = now_s - belief.sent_s, belief.sensed
     if state != belief.state or since_s >= KEEP_ALIVE_S:
         return True
     if state[0] != "armed" or since_s < interval_s:  # not armed: triggers are released
@@ -166,12 +168,14 @@ class TelemetryDeadband:
     def __init__(self) -> None:
         self._sent: Telemetry | None = None
         self._words: tuple[Any, ...] = ()
-        self._looked_s = self._sent_s = -math.inf
+        self._looked_s = self._sent_s = self._turned_s = -math.inf
+        self._early_s = 0.0
 
     def may_be_due(self, words: tuple[Any, ...], now_s: float) -> bool:
         """Return whether to make a telemetry for `due`: when its texts and states change, else 50 times a second."""
         changed = words != self._words
-        if not changed and now_s - self._looked_s + _HALF_A_TICK_S < _SEEN_PERIOD_S:
+        self._early_s, self._turned_s = EARLY * (now_s - self._turned_s), now_s
+        if not changed and now_s - self._looked_s + self._early_s < _SEEN_PERIOD_S:
             return False
         if changed:
             self._sent = None
@@ -181,7 +185,7 @@ class TelemetryDeadband:
     def due(self, view: Telemetry, now_s: float) -> bool:
         """Return whether a telemetry leaves: its change is visible, or the last one left 0.1 s ago."""
         sent = self._sent
-        if sent is not None and now_s - self._sent_s + _HALF_A_TICK_S < _SEEN_AT_LEAST_S and _alike(view, sent):
+        if sent is not None and now_s - self._sent_s + self._early_s < _SEEN_AT_LEAST_S and _alike(view, sent):
             return False
         self._sent, self._sent_s = view, now_s
         return True

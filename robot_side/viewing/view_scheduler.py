@@ -63,7 +63,7 @@ class ViewScheduler:
         self._cameras = cameras
         self._room = room
         self._always = frozenset(always)
-        self._ticks_s: deque[float] = deque(maxlen=1000)
+        self._ticks_s: deque[float] = deque(maxlen=250)
         self._ticks = TickFigures()
         self._next_figures_s = self._next_look_s = -math.inf
         self._next_s: dict[str, float] = {}

@@ -11,11 +11,11 @@ from common.timing.ages import LoopAge, QueueingAge
 delays = st.lists(st.floats(0.0, 1.0), min_size=1, max_size=100)
 
 
-@given(st.floats(0.0, 1.0), st.floats(0.0, 1.0))
-def test_a_silence_counts_but_for_what_the_deadbands_allow(silent_s: float, longer_s: float) -> None:
-    counted = counted_s(silent_s)
-    assert counted == pytest.approx(min(silent_s, 0.004) + max(silent_s - 0.02, 0.0))
-    assert counted - 1e-12 <= counted_s(silent_s + longer_s) <= counted + longer_s + 1e-12
+@given(st.floats(0.0, 1.0), st.floats(0.0, 1.0), st.floats(0.001, 0.02))
+def test_a_silence_counts_but_for_what_the_deadbands_allow(silent_s: float, longer_s: float, turn_s: float) -> None:
+    counted = counted_s(silent_s, turn_s)
+    assert counted == pytest.approx(min(silent_s, turn_s) + max(silent_s - 0.02, 0.0))
+    assert counted - 1e-12 <= counted_s(silent_s + longer_s, turn_s) <= counted + longer_s + 1e-12
 
 
 def test_loop_age_is_the_worst_case_until_known_and_after_reset() -> None:
@@ -44,7 +44,7 @@ def test_loop_age_is_settled_when_the_worst_case_has_died_away() -> None:
 
 @pytest.mark.parametrize("elapsed_s", [0.0, 0.1, 0.5, 3.0])
 def test_loop_age_falls_exponentially(elapsed_s: float) -> None:
-    loop_age = LoopAge(worst_case_s=0.4, window=1, time_constant_s=0.5)
+    loop_age = LoopAge(worst_case_s=0.4, window_s=1e-9, time_constant_s=0.5)
     loop_age.update(0.100, 10.0)
     expected_s = 0.100 + 0.300 * math.exp(-elapsed_s / 0.5)
     assert loop_age.value(10.0 + elapsed_s) == pytest.approx(expected_s, rel=1e-12)
@@ -52,7 +52,7 @@ def test_loop_age_falls_exponentially(elapsed_s: float) -> None:
 
 @given(delays)
 def test_loop_age_never_lies_below_the_quantile_or_rises_by_waiting(ages_s: list[float]) -> None:
-    loop_age = LoopAge(worst_case_s=0.2, probability=0.5, window=5)
+    loop_age = LoopAge(worst_case_s=0.2, probability=0.5, window_s=0.045)
     for tick, age_s in enumerate(ages_s):
         now_s = 0.01 * tick
         loop_age.update(age_s, now_s)

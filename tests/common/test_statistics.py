@@ -84,9 +84,9 @@ def test_quantiles_of_a_long_run_cover_all_of_it() -> None:
 
 def test_what_is_no_number_no_probability_or_no_window_is_refused() -> None:
     running, sliding = RunningStatistics(0), SlidingQuantile()
-    refused: list[tuple[str, Callable[[], object]]] = [("window = 0", lambda: SlidingQuantile(window=0))]
+    refused: list[tuple[str, Callable[[], object]]] = [("window_s = 0", lambda: SlidingQuantile(window_s=0.0))]
     for value in (math.nan, math.inf, -math.inf):
-        refused += [("value = ", partial(running.add, value)), ("value = ", partial(sliding.update, value))]
+        refused += [("value = ", partial(running.add, value)), ("value = ", partial(sliding.update, value, 0.0))]
         refused += [("values", partial(running.extend, [1.0, value]))]
     for p in (-0.01, 1.01, math.nan):
         refused += [("probability = ", partial(one, probability=p)) for one in (running.quantile, SlidingQuantile)]
@@ -98,20 +98,20 @@ def test_what_is_no_number_no_probability_or_no_window_is_refused() -> None:
 
 @given(samples, st.integers(1, 50), st.sampled_from([0.05, 0.25, 0.5, 0.75, 0.95, 1.0]))
 def test_sliding_quantile_agrees_with_numpy(values: list[float], window: int, probability: float) -> None:
-    sliding = SlidingQuantile(window, probability)
+    sliding = SlidingQuantile(float(window), probability)
     for position, value in enumerate(values):
-        sliding.update(value)
+        sliding.update(value, float(position))
         newest = values[max(0, position + 1 - window) : position + 1]
         assert sliding.value == np.quantile(newest, probability, method="inverted_cdf")
 
 
 def test_sliding_quantile_forgets_on_request() -> None:
-    sliding = SlidingQuantile(window=3)
+    sliding = SlidingQuantile(window_s=3.0)
     for value in (1.0, 2.0, 3.0, 4.0):
-        sliding.update(value)
+        sliding.update(value, value)
     sliding.clear()
     assert sliding.value is None
-    sliding.update(0.5)
+    sliding.update(0.5, 5.0)
     assert sliding.value == 0.5
 
 

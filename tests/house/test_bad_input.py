@@ -105,6 +105,9 @@ def complaint(command: str) -> str:
         ("feelahead-operator --swap-sides --person.pull-n=3", "--swap-sides and --person", "valid"),
         ("feelahead-operator --tui --status=json", "--tui and --status json", "one of them"),
         ("feelahead-operator --asymmetry=-11s", "-11s", "10s"),
+        ("feelahead-operator --tick-period 4", "--tick-period: '4'", "50ms"),
+        ("feelahead-robot --tick-period 0.5ms", "--tick-period 0.5ms", "1ms to 20ms"),
+        ("feelahead try approach --tick-period 21ms", "--tick-period 21ms", "1ms to 20ms"),
     ],
 )
 def test_one_line_names_the_value_and_what_is_valid(

@@ -10,6 +10,7 @@ from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
 
+from common.periods import TURN_S
 from common.protocol.codec import encode
 from common.protocol.link_end import LinkEnd
 from common.protocol.messages import LeaseNotice, MotionCommand, MotionState
@@ -178,11 +179,12 @@ class Core(RuleBasedStateMachine):
         if self.hung:
             self.hung = False
             return
+        self.bench.now_s += TURN_S
         self.look()
         if self.bench.now_s - self.heard_s > 0.5:
             self.lease = None
         commands, expected = self.bench.commands(), self.expected()
-        leaves = expected is not None and (expected != self.commanded or self.bench.now_s - self.told_s > 0.018)
+        leaves = expected is not None and (expected != self.commanded or self.bench.now_s - self.told_s > 0.013)
         assert [fields_of(command) for command in commands] == ([expected] if leaves else [])
         self.told_s, self.commanded = (self.bench.now_s if leaves else self.told_s), expected
         self.bench.write()

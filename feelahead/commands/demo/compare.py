@@ -22,7 +22,7 @@ from feelahead.printing.progress import progress
 
 _TAKEN: Final = {
     *("compare", "config", "console", "console_port", "duration", "link", "link_model"),
-    *("probability", "scene", "seed", "summary"),
+    *("probability", "scene", "seed", "summary", "tick_period"),
 }
 """Settings that a comparison takes"""
 _LONGEST_S: Final = 45.0
@@ -85,8 +85,7 @@ def compute(settings: DemoSettings, *, pictures: bool | None = None) -> list[dic
                 MISJUDGES_DEPTH,
                 limit_s,
                 settings.link_model,
-                # The same as in `feelahead try haptics`: half the time, and the same contacts.
-                tick_period_s=0.004,
+                tick_period=settings.tick_period,
                 probability=settings.probability,
             )
             runs.append({"name": name, **compared_run(trial, settings.seed, shown.advance, pictures=drawn)})

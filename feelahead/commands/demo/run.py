@@ -30,7 +30,7 @@ _WITHOUT_PAGES_S = 30.0
 _FEW_PROCESSORS: Final = 2
 SMALL_PICTURES: Final = ("--cameras.width=320", "--cameras.height=240", "--cameras.rate-hz=15")
 """Pictures that few processors can draw, code and show beside both sides (docs/console.md)"""
-_SHARED = ("link", "link_model", "asymmetry", "full_rate", "seed", "realtime")
+_SHARED = ("link", "link_model", "asymmetry", "tick_period", "full_rate", "seed", "realtime")
 """Flags that the demo passes to both sides."""
 
 

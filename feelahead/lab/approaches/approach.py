@@ -11,6 +11,7 @@ import numpy as np
 from common.arrays import FloatArray
 from common.emulation.clauses import LinkModel
 from common.errors import FeelaheadError
+from common.periods import TURN
 from common.protocol.messages import Vector2
 from feelahead.both_sides.loopback import Loopback, LoopbackSettings, robot_parts
 from feelahead.lab.approaches.arming import wait_for_pull
@@ -72,6 +73,8 @@ class Approach:
     assist: Assist = "none"
     full_rate: bool = False
     """Whether both sides send every message, as with `--full-rate`."""
+    tick_period: str = TURN
+    """Period of both sides' turns"""
     camera_sd_m: float | None = None
     """Standard deviation σ_c of the camera's error, in metres; None: the default of the settings."""
 
@@ -94,6 +97,7 @@ class PullRun(Listener):
             haptics=approach.law != "none",
             compensation=compensation_of(approach.law),
             full_rate=approach.full_rate,
+            tick_period=approach.tick_period,
         )
         scene = load_scene(robot.model, robot.site, robot.roles, site_axis=robot.site_axis)
         self.truth = TrueContact(scene)
@@ -181,6 +185,7 @@ def robot_settings(approach: Approach) -> RobotSettings:
         law=law_of_robot(approach.law),
         assist=approach.assist,
         full_rate=approach.full_rate,
+        tick_period=approach.tick_period,
         camera=CameraSettings() if approach.camera_sd_m is None else CameraSettings(sd_m=approach.camera_sd_m),
     )
 
@@ -207,6 +212,8 @@ def _outcome(run: PullRun) -> Outcome:
     if onset is not None or run.disarmed_because is not None:
         end = "contact" if onset is not None else "disarmed"
     stopped = end == "stopped"
+    # At a contact the arm has braked already in the turn that shows it.
+    speeds_m_s = trace.speed_m_s[: None if onset is None else -1].tolist()
     return Outcome(
         end=end,
         contact_speed_mm_s=None if onset is None else 1e3 * onset.closing_speed_m_s,
@@ -214,7 +221,7 @@ def _outcome(run: PullRun) -> Outcome:
         least_gap_mm=1e3 * float(trace.gap_m.min(initial=math.inf)),
         stops_at_mm=1e3 * float(trace.gap_m[-1]) if stopped else None,
         way_left_mm=1e3 * run.truth.way_left_m(run.truth.approach()[0], run.loopback.robot.held) if stopped else None,
-        reversals=reversals(trace.speed_m_s.tolist()),
+        reversals=reversals(speeds_m_s),
         ended_s=float(trace.time_s[-1]),
         trace=trace,
         why=run.disarmed_because if end == "disarmed" else None,

@@ -12,7 +12,7 @@ import numpy as np
 
 from common.arrays import FloatArray
 from common.errors import FeelaheadError
-from common.silence import MOTION_PERIOD_S
+from common.periods import TURN_S
 from feelahead.both_sides.loopback import Loopback, LoopbackSettings, robot_parts
 from feelahead.lab.approaches.arming import wait_for_pull
 from feelahead.lab.approaches.frozen import SITE, frozen_scene
@@ -25,10 +25,10 @@ from robot_side.drivers.mujoco.scene import Scene, load_scene
 from robot_side.settings import RobotSettings
 from robot_side.tick.events import Listener
 
-POSE_S = 0.01
+TICK_S = TURN_S
+"""Period of both sides' turns, in seconds: that of the commands, and of which messages each had last received"""
+POSE_S = 2.0 * TICK_S
 """Sampling period of the true pose, in seconds."""
-TICK_S = 0.001
-"""Period, in seconds, at which it is recorded which messages each side had last received."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class RecordedApproach:
     seed: int
     began_s: float
     pose_time_s: FloatArray
-    """(k,) times of the poses: every 10 ms, from a second before the pull"""
+    """(k,) times of the poses: every 8 ms, from a second before the pull"""
     joint_positions_rad: FloatArray
     """(k, n) true positions of the arm's joints"""
     joint_velocities_rad_s: FloatArray
@@ -48,7 +48,7 @@ class RecordedApproach:
     loop_age_s: FloatArray
     """(k,) t_d of eq. 8 at the robot side"""
     tick_time_s: FloatArray
-    """(l,) times of the ticks: every millisecond"""
+    """(l,) times of the ticks: every 4 ms"""
     applied_sent_s: FloatArray
     """(l,) when the operator side sent the command that the arm follows; NaN for none"""
     applied_at_s: FloatArray
@@ -140,7 +140,7 @@ class _Notes(Listener):
         row = {"tick_time_s": now_s, "applied_sent_s": self._applied[0], "applied_at_s": self._applied[1]}
         row["seen_sent_s"] = math.nan if seen is None else seen.header.sent_s
         self._ticks.append(row | {"travel": run.device.travel})
-        if number % round(MOTION_PERIOD_S / TICK_S) == 0 and (intent := run.operator.intent) is not None:
+        if (intent := run.operator.intent) is not None:
             row = {"command_time_s": now_s, "command": intent.r2 - intent.l2}
             self._commands.append(row | {"lateral": intent.lateral, "turning": intent.turning})
         if number % round(POSE_S / TICK_S) == 0:

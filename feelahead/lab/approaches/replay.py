@@ -85,7 +85,7 @@ class Replay:
 
     @cached_property
     def estimated(self) -> list[GripperPose]:
-        """Gripper for each row of the poses, as estimated from noisy encoders that are read every millisecond."""
+        """Gripper for each row of the poses, as estimated from noisy encoders that are read in every tick."""
         encoder = Encoder(self.encoder.sigma_rad, self.encoder.resolution_rad, self._seed)
         estimate, found = JointEstimate(), []
         for row, until_s in enumerate(self.record.pose_time_s.tolist()):

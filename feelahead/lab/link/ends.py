@@ -87,12 +87,11 @@ class RobotEnd(_Side):
         return self._sockets.receive()
 
     def _take(self, received: Any, now_s: float) -> None:
-        for peer, payload in self._admission.admitted(received, self._session.owner_peer):
+        for peer, payload in self._admission.admitted(received, self._session.owner_peer, now_s):
             self._session.receive(peer, payload, now_s)
 
     def _tick(self, now_s: float) -> None:
         session = self._session
-        self._admission.begin_tick()
         session.update(now_s)
         if session.take_owner_changed():
             self._loop_age.reset()

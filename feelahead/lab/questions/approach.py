@@ -17,8 +17,10 @@ from rich.console import RenderableType
 from rich.table import Table as Shown
 from rich.text import Text
 
+from common.command.run_options import TickPeriod, tick_period_s
 from common.emulation.clauses import LinkModel
 from common.files.input_file import require_input_file
+from common.periods import TURN
 from common.protocol.messages import Compensation, Vector2
 from feelahead.lab.approaches.approach import Approach, compile_kernels, run_approach
 from feelahead.lab.approaches.frozen import AHEAD, ASIDE, GRIPPED, SCENES, SITE, frozen_hash, frozen_scene, scene_names
@@ -87,11 +89,14 @@ class ApproachSettings(Sweep):
     """speed: the robot side also limits the speed along the triggers. none: it does not."""
     full_rate: bool = False
     """Let both sides send every message, even if its change cannot be felt."""
+    tick_period: TickPeriod = TURN
+    """Period of both sides' turns, 1ms to 20ms."""
     camera_mm: Annotated[float, Meta(ge=0.0, le=1000.0), tyro.conf.arg(metavar="MM")] = 3.0
     """Standard deviation of the camera's error; the law uses the same value."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        tick_period_s(self.tick_period)
         for name in ("force", "strongest_effect", "link", "law", "compensation"):
             if not getattr(self, name):
                 raise ValueError(f"--{name.replace('_', '-')}: no value is given; valid: one value or more")
@@ -143,6 +148,7 @@ def cells(settings: ApproachSettings) -> Iterator[Approach]:
             turn=turn,
             assist=settings.assist,
             full_rate=settings.full_rate,
+            tick_period=settings.tick_period,
             camera_sd_m=1e-3 * settings.camera_mm,
         )
 
@@ -261,8 +267,7 @@ def _draw_comparison(table: Table, frozen: str, path: Path) -> None:
                 )
             panel.set(title=f"{force_n:g} N", xlabel="delay each way, ms (beside each other: the laws)")
             panel.grid(alpha=0.3)
-        panels[0][0].set_ylim(bottom=-5.0)
-        panels[0][0].set_ylabel("speed at contact, mm/s (0: no contact)")
+        panels[0][0].set(ylim=(-5.0, None), ylabel="speed at contact, mm/s (0: no contact)")
         drawn.legend(loc="outside right upper", fontsize=7)
 
 

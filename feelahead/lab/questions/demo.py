@@ -12,7 +12,9 @@ import tyro
 from msgspec import Meta
 from rich.table import Table as Shown
 
+from common.command.run_options import TickPeriod, tick_period_s
 from common.emulation.clauses import LinkModel
+from common.periods import TURN
 from feelahead.both_sides.grasping_trial import Trial, run_trial
 from feelahead.lab.approaches.links import require_young_loop
 from feelahead.lab.sweep import Question, Sweep
@@ -27,7 +29,6 @@ from robot_side.drivers.mujoco.checks.start_collision import start_collision
 from robot_side.drivers.mujoco.gripper_measurement import measure_gripper
 from robot_side.drivers.mujoco.robot_model import SiteAxis
 from robot_side.drivers.mujoco.scene import load_scene
-from robot_side.main import TICK_PERIOD_S
 
 COLUMNS: Final = {
     "seed": ("seed", 0),
@@ -64,12 +65,13 @@ class DemoSettings(Sweep):
     """datagram: messages may be lost and reordered. stream: messages stay in order and losses delay them."""
     duration: Annotated[float, Meta(gt=0.0, lt=1e4), tyro.conf.arg(metavar="SECONDS")] = 40.0
     """Maximum duration of each run, in virtual time."""
-    tick_period: Annotated[float, Meta(gt=0.0, le=0.02), tyro.conf.arg(metavar="SECONDS")] = TICK_PERIOD_S
-    """Period of the robot side's ticks; a longer one costs less time."""
+    tick_period: TickPeriod = TURN
+    """Period of both sides' turns, 1ms to 20ms."""
     person: PersonSettings = field(default_factory=PersonSettings)
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        tick_period_s(self.tick_period)
         if self.person.pull_n is not None:
             raise ValueError(
                 f"--person.pull-n {self.person.pull_n}: a finger that only pulls cannot do the task; valid: without it"
@@ -85,7 +87,7 @@ def cells(settings: DemoSettings) -> Iterator[Trial]:
     for link in settings.link[: 1 if settings.quick else None]:
         one = Trial(settings.scene, link, "reacting", settings.person, settings.duration, settings.link_model)
         own = replace(one, model=settings.model, site=settings.site, site_axis=settings.site_axis)
-        yield replace(own, tick_period_s=settings.tick_period)
+        yield replace(own, tick_period=settings.tick_period)
 
 
 def run(cell: Trial, seed: int) -> Iterator[Row]:

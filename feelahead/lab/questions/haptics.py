@@ -29,8 +29,6 @@ _ARMS: dict[Arm, str] = {"off": "off", "mechanical": "on, no notice taken", "rea
 
 _JITTER_MS = 10.0
 """Standard deviation of all delays but 0"""
-_TICK_S = 0.004
-"""Period of the robot side's ticks; 1 ms, that of the real robot side, would take more than twice the time"""
 
 # Beyond a loop age of two seconds the robot side is never armed.
 _Delay = Annotated[float, Meta(ge=0.0, lt=1000.0)]
@@ -101,9 +99,8 @@ def cells(settings: HapticsSettings) -> Iterator[Cell]:
                 settings.person,
                 settings.duration,
                 settings.link_model,
-                _TICK_S,
-                1e-3 * settings.camera_mm,
-                settings.probability,
+                camera_sd_m=1e-3 * settings.camera_mm,
+                probability=settings.probability,
             ),
         )
 

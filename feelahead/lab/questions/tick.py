@@ -137,7 +137,7 @@ def show(_: TickSweep, table: Table) -> Iterator[RenderableType]:
     figures: tuple[str, ...] = ("p50_us", "p99_us", "p50_of_mixed", "p99_of_mixed")
     stages = table.where(case="demo, each stage timed")
     columns = ("stage", *figures, "p10_us", "mean_us")
-    yield shown(f"the demo's tick at 1 kHz, {machine}", columns, stages.lines(*columns))
+    yield shown(f"the demo's tick, {machine}", columns, stages.lines(*columns))
     sums = Table(row for row in table if row["stage"] in (_LOOK, "without physics", "tick") or row["objects"] == 1)
     columns = ("case", "stage", *figures, "share", "overruns")
     yield shown(f"by objects perceived, {machine}", columns, sums.lines(*columns))

@@ -1,4 +1,4 @@
-"""Measure looks at concave objects in turns with "mixed"; calls begin at least a millisecond apart, as ticks do."""
+"""Measure looks at concave objects in turns with "mixed"; calls begin at least 4 ms apart, as ticks do."""
 
 import functools
 import itertools
@@ -11,6 +11,7 @@ from typing import Final
 import numpy as np
 
 from common.arrays import FloatArray
+from common.periods import TURN_S
 from common.realtime.pacing import SPIN_S
 from feelahead.lab.approaches.frozen import SITE
 from feelahead.lab.posed_gripper import PosedGripper
@@ -27,7 +28,6 @@ from robot_side.surroundings.scene_table import scene_table
 
 _FREE_MM: Final = tuple(np.linspace(5.0, 150.0, 30).tolist())
 _CHUNK: Final = 20
-_PERIOD_S: Final = 1e-3
 _PROBABILITY: Final = 0.99
 _REACH_M, _FARTHEST_M = 0.4, 2.0
 
@@ -70,8 +70,8 @@ def _chunk(works: Iterator[Callable[[], object]]) -> list[float]:
     """Return the processor times of a chunk of calls; the first call, which comes after other work, does not count."""
     spent_s = []
     for work in itertools.islice(works, _CHUNK):
-        # Sleep, then spin to the next millisecond.
-        due_s = _PERIOD_S * (1 + math.floor(time.perf_counter() / _PERIOD_S))
+        # Sleep, then spin to the next turn.
+        due_s = TURN_S * (1 + math.floor(time.perf_counter() / TURN_S))
         time.sleep(max(due_s - time.perf_counter() - SPIN_S, 0.0))
         while time.perf_counter() < due_s:
             pass

@@ -8,6 +8,7 @@ import msgspec
 
 from common.arrays import FloatArray
 from common.errors import OtherVersionError, RemoteProtocolError
+from common.periods import EARLY
 from common.timing.clock_offset import MAX_SKEW, ROUNDING
 from common.timing.offset_interval import OffsetInterval
 from robot_side.arm.port import ArmState
@@ -63,7 +64,7 @@ class DriverClock:
 SILENT_S: Final = 0.1
 """Silence, in seconds, after which a driver is lost"""
 COMMAND_PERIOD_S: Final = 0.004
-"""Minimum period of commands, in seconds; a command that stops the arm leaves at once."""
+"""Period of commands, in seconds, to the nearest turn; a command that stops the arm leaves at once."""
 _REFUSAL_PERIOD_S: Final = 1.0
 _NEWS_PERIOD_S: Final = 1.0
 """Minimum period of notes about a driver's connection, in seconds"""
@@ -112,6 +113,7 @@ class DriverSession:
         self._last_command = _LastCommand((0.0,) * len(shape.joint_names), -math.inf)
         self._sent = self._sent_before = 0
         self._sent_s, self._first_sent_s = -math.inf, math.inf
+        self._turned_s = self._turn_s = 0.0
         self._moves = False
         self._refused_s = -math.inf
         self._outgoing: list[tuple[bytes, bytes]] = []
@@ -182,7 +184,9 @@ class DriverSession:
         leaving, self._outgoing = self._outgoing, []
         closing = self._closing[0] if self._closing[1] > now_s else 0.0
         moves = (any(self._last_command.velocities) and self._last_command.until_s > now_s) or closing != 0.0
-        due = now_s - self._sent_s >= COMMAND_PERIOD_S or (self._moves and not moves)
+        if now_s > self._turned_s:
+            self._turn_s, self._turned_s = now_s - self._turned_s, now_s
+        due = now_s - self._sent_s + EARLY * self._turn_s >= COMMAND_PERIOD_S or (self._moves and not moves)
         if self._peer is not None and due:
             self._sent += 1
             self._sent_s, self._moves = now_s, moves

@@ -1,4 +1,4 @@
-"""Distances of (point, placed mesh) pairs in contiguous arrays, for calls in a 1 kHz tick.
+"""Distances of (point, placed mesh) pairs in contiguous arrays, for calls in a tick.
 
 Arguments are not checked, as in `kernels`. A placed mesh is queried in its own frame. There a point, or a sphere's
 centre, is Qᵀ (centre - position), with Q the rotation from the mesh's frame to the world.

@@ -55,8 +55,7 @@ def side() -> Steps:
     side = Steps(clock)
     loop = Loop(PERIOD_S, "", 0, clock)
     loop.run(side, StopSignal(), STOPPED_S + 10 * PERIOD_S)
-    assert len(side.told) == 1
-    assert "turns are left out" in side.told[0]
+    assert side.told == []  # a single pause is no reason for a longer period
     assert loop.summary("robot")["pacing"]["robot"]["overruns"] == pytest.approx(STOPPED_S / PERIOD_S, rel=1e-3)
     return side
 

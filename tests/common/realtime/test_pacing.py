@@ -25,6 +25,23 @@ def test_every_deadline_is_taken_or_counted_once(late_s: list[float], period_s: 
     assert pacer.turns + pacer.overruns == taken
 
 
+@given(st.lists(st.tuples(st.floats(0.0, 0.02), st.sampled_from([1e-3, 4e-3, 0.02])), min_size=1, max_size=50))
+def test_another_period_begins_at_the_next_deadline(turns: list[tuple[float, float]]) -> None:
+    pacer = Pacer(PERIOD_S, 7.0)
+    for late_s, period_s in turns:
+        pacer.begin(pacer.deadline_s + late_s)
+        assert pacer.late_s == pytest.approx(late_s, abs=1e-9)
+        next_s = pacer.deadline_s
+        pacer.change(period_s)
+        assert pacer.deadline_s == next_s
+        pacer.begin(next_s)
+        assert pacer.missed == 0
+        assert pacer.deadline_s == pytest.approx(next_s + period_s)
+        told = pacer.summary()
+        assert (told["period_ms"], told["period_changes"][-1]["period_ms"]) == (1e3 * period_s, 1e3 * period_s)
+        assert told["period_changes"][-1]["time_s"] == pytest.approx(next_s - 7.0)
+
+
 def test_refuses_to_begin_before_its_time_and_odd_periods() -> None:
     pacer = Pacer(PERIOD_S, 1.0)
     assert not pacer.due(0.999)

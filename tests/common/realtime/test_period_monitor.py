@@ -2,7 +2,8 @@ import pytest
 
 from common.clock import VirtualClock
 from common.realtime.pacing import Pacer
-from common.realtime.period_monitor import WINDOW_S, PeriodMonitor
+from common.realtime.period_choice import PATIENCE_S, WINDOW_S
+from common.realtime.period_monitor import PeriodMonitor
 from common.realtime.stolen_time import StolenTime
 
 PERIOD_S = 1e-3
@@ -55,16 +56,38 @@ def test_a_loop_that_keeps_up_is_told_nothing() -> None:
     loop.run(4 * WINDOW_S, 0.4e-3)
     loop.run(4 * WINDOW_S, 2.5e-3, every=100)
     assert loop.said == []
+    assert loop.pacer.period_s == PERIOD_S
     assert loop.period_monitor.summary() == {"said": None, "waited": 0.0, "stolen": 0.0}
 
 
-def test_too_slow_names_the_time_and_what_would_help_once() -> None:
+def test_too_slow_names_the_time_the_period_taken_and_what_would_help() -> None:
     loop = Loop()
     loop.run(4 * WINDOW_S, 1.5e-3)
     (text,) = loop.said
     assert text.startswith("this machine is too slow: a turn computes for 1.5 ms where there are 1 ms, and ")
-    assert text.endswith("33 % of the turns are left out; a faster machine would help")
+    assert text.endswith("33 % of the deadlines are missed: turns now begin every 2ms; a faster machine would help")
     assert loop.period_monitor.summary()["said"] == text
+    assert loop.pacer.period_s == 2e-3
+
+
+def test_each_change_is_one_line_and_the_cause_is_told_once() -> None:
+    loop = Loop()
+    loop.run(4 * WINDOW_S, 4.5e-3)
+    assert [text.partition(": turns now begin ")[2].partition(";")[0] for text in loop.said] == [
+        *("every 2ms", "every 4ms", "every 5ms")
+    ]
+    assert loop.said[1] == "56 % of the deadlines are missed: turns now begin every 4ms"
+    loop.run(4 * PATIENCE_S, 0.1e-3)
+    assert loop.said[3:] == [f"turns begin every {period} again" for period in ("4ms", "2ms", "1ms")]
+
+
+def test_a_loop_that_keeps_no_period_says_so_once() -> None:
+    loop = Loop()
+    loop.pacer.change(0.02)
+    loop.period_monitor = PeriodMonitor(loop.pacer, loop.wall, loop.processor, "a faster machine")
+    loop.run(4 * WINDOW_S, 0.03)
+    (text,) = loop.said
+    assert text.endswith(" of the deadlines are missed; a faster machine would help")
 
 
 def test_turns_that_are_too_long_at_times_are_slow_where_nobody_disturbed_them() -> None:
@@ -76,7 +99,7 @@ def test_turns_that_are_too_long_at_times_are_slow_where_nobody_disturbed_them()
 def test_too_busy_when_others_have_the_processor() -> None:
     loop = Loop(waited=0.4)
     loop.run(2 * WINDOW_S, 0.3e-3, 1.4e-3)
-    (text,) = loop.said
+    text = loop.said[0]
     assert text.startswith("this machine is too busy: a turn lasts 1.4 ms and computes for 0.3 ms")
     assert "others had the processor for 40 % of the time: closing other programs, or --realtime, would help" in text
     assert loop.period_monitor.summary()["waited"] == pytest.approx(0.4)

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, precondition, rule
 
 from common.sockets import robot as robot_sockets
-from common.sockets.admission import EACH_OTHER_PER_TICK, OTHERS_PER_TICK, Admission
+from common.sockets.admission import AT_ONCE_S, EACH_OTHER_PER_S, OTHERS_PER_S, Admission
 from common.sockets.peers import peer_name_of
 from common.sockets.port_connections import PortConnections
 from common.sockets.robot import RobotSockets
@@ -196,21 +196,41 @@ TestConnections.settings = settings(max_examples=200, stateful_step_count=30, ph
 
 
 def test_a_flooding_stranger_takes_nothing_from_the_operator_or_from_other_strangers() -> None:
-    def seen(admission: Admission, *peers: bytes, operator: bytes | None = b"operator") -> list[bytes]:
-        return [peer for peer, _ in admission.admitted([(peer, b"") for peer in peers], operator)]
+    def seen(
+        admission: Admission, *peers: bytes, operator: bytes | None = b"operator", now_s: float = 7.0
+    ) -> list[bytes]:
+        return [peer for peer, _ in admission.admitted([(peer, b"") for peer in peers], operator, now_s)]
 
     admission, flood = Admission(), [b"flood"] * 1000
-    few = flood[:EACH_OTHER_PER_TICK]
+    few = flood[: round(AT_ONCE_S * EACH_OTHER_PER_S)]
     assert seen(admission, *flood, b"observer", b"operator", *flood, b"operator") == [
         *(*few, b"observer", b"operator", b"operator")
     ]
-    assert admission.unread == 2000 - EACH_OTHER_PER_TICK
+    assert admission.unread == 2000 - len(few)
     assert seen(Admission(), *flood, operator=None) == few
     crowd = [b"%d" % number for number in range(100)]
-    for _ in range(3):
-        admission.begin_tick()
-        assert len(seen(admission, *crowd)) == OTHERS_PER_TICK
-        assert seen(admission, *crowd) == [], "however often one receives within the tick"
+    for now_s in (8.0, 9.0, 10.0):
+        assert len(seen(admission, *crowd, now_s=now_s)) == round(AT_ONCE_S * OTHERS_PER_S)
+        assert seen(admission, *crowd, now_s=now_s) == [], "however often one receives at that time"
+
+
+@pytest.mark.parametrize("turn_s", [0.001, 0.004, 0.02])
+def test_eight_observers_are_heard_whatever_the_period_of_turns_and_a_flood_is_cut(turn_s: float) -> None:
+    admission, observers, heard = Admission(), [b"%d" % number for number in range(8)], 0
+    turns = round(1.0 / turn_s)
+    for turn in range(turns):
+        arrived = [
+            (peer, b"")
+            for peer in observers
+            for _ in range(round(250 * turn_s * (turn + 1)) - round(250 * turn_s * turn))
+        ]
+        heard += len(list(admission.admitted(arrived, b"operator", turn * turn_s)))
+    assert (heard, admission.unread) == (8 * 250, 0)
+    flooded = [
+        len(list(admission.admitted([(b"flood", b"")] * 100, b"operator", 1.0 + turn * turn_s)))
+        for turn in range(turns)
+    ]
+    assert sum(flooded) <= EACH_OTHER_PER_S * (1.0 + AT_ONCE_S)
 
 
 def test_a_crowd_loses_its_oldest_newcomer_and_keeps_introduced_peers() -> None:

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from common.clock import VirtualClock
-from common.silence import MOTION_PERIOD_S
+from common.periods import TURN_S
 from common.sockets import robot as robot_sockets
 from common.sockets.allow_list import AllowList
 from common.sockets.authentication import RobotKeys, make_key_pair
@@ -164,7 +164,7 @@ def test_a_message_of_too_many_frames_is_dropped_in_bounded_steps(
 def test_a_peer_that_floods_is_cut_off_and_the_operator_is_not(
     robot: RobotSockets, operator: OperatorSockets, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    assert round(20 / MOTION_PERIOD_S) == robot_sockets.PEER_LIMIT_PER_S
+    assert round(20 / TURN_S) == robot_sockets.PEER_LIMIT_PER_S
     monkeypatch.setattr(robot_sockets, "PEER_LIMIT_PER_S", 200)
     monkeypatch.setattr(robot, "_second", 0)
     monkeypatch.setattr(robot, "_clock", VirtualClock())  # All messages fall into one second.

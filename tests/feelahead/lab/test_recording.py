@@ -42,7 +42,7 @@ def test_what_was_sent_arrives_one_delay_later() -> None:
     assert followed_s.min() >= DELAY_S - 1e-9
     assert followed_s.max() < DELAY_S + 0.004 + TICK_S
     seen_s = (one.tick_time_s - one.seen_sent_s)[~np.isnan(one.seen_sent_s)]
-    assert len(seen_s) > 1000
+    assert len(seen_s) > 700
     assert seen_s.min() >= DELAY_S - 1e-9
     # Stiffness comes with each tick, or every few of them.
     assert seen_s.max() < DELAY_S + 0.01

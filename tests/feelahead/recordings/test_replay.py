@@ -181,6 +181,17 @@ def test_a_recording_of_another_protocol_is_refused_in_one_line(
     assert str(caught.value) == f"{run.path}: recorded with protocol version {theirs}; valid: {ours}"
 
 
+@pytest.mark.parametrize(("side", "again"), [("robot", replay_robot), ("operator", replay_operator)])
+def test_a_recording_from_before_the_period_was_a_setting_is_refused_in_one_line(
+    run: Recording, side: str, again: Callable[[Recording], Comparison]
+) -> None:
+    before = {name: value for name, value in run.headers[side]["settings"].items() if name != "tick_period"}
+    old = dataclasses.replace(run, headers={side: {**run.headers[side], "settings": before}})
+    with pytest.raises(ConfigurationError, match=f"its settings lack tick_period: its {side} side cannot be") as caught:
+        again(old)
+    assert "\n" not in str(caught.value)
+
+
 def some_stiffness(run: Recording) -> bytes:
     for one in recorded_entries(run, "robot", []):
         if one.kind == Kind.SENT:

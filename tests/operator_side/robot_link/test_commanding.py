@@ -1,3 +1,4 @@
+import math
 from dataclasses import replace
 from itertools import pairwise
 from typing import Any
@@ -6,7 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from common.silence import LONGEST_HELD_S, MOTION_PERIOD_S
+from common.periods import PERIODS_S, TURN_S
+from common.silence import LONGEST_HELD_S
 from operator_side.hands.intent import OperatorIntent
 from operator_side.robot_link.commanding import STOPPING, HeldCommand
 from robot_side.operators.safety import SafetySettings
@@ -30,7 +32,7 @@ def test_what_is_held_is_what_is_meant(steps: Any) -> None:
     known, known_s, now_s = None, 0.0, 0.0
     for meant, turns, drift in steps:
         for turn in range(turns):
-            now_s += MOTION_PERIOD_S
+            now_s += TURN_S
             intent = replace(meant, r2=min(max(meant.r2 + turn * drift, 0.0), 1.0))
             if held.due(intent, 7, now_s) is not None:
                 known, known_s = intent, now_s
@@ -42,16 +44,32 @@ def test_what_is_held_is_what_is_meant(steps: Any) -> None:
 
 
 def test_a_hand_that_holds_still_is_heard_every_16_ms_and_at_full_rate_each_time() -> None:
-    for full_rate, period_s in ((False, LONGEST_HELD_S), (True, MOTION_PERIOD_S)):
+    for full_rate, period_s in ((False, LONGEST_HELD_S), (True, TURN_S)):
         held = HeldCommand(full_rate=full_rate)
-        sent = [turn * MOTION_PERIOD_S for turn in range(250) if held.due(REST, 7, turn * MOTION_PERIOD_S) is not None]
+        sent = [turn * TURN_S for turn in range(250) if held.due(REST, 7, turn * TURN_S) is not None]
         assert [later - earlier for earlier, later in pairwise(sent)] == pytest.approx([period_s] * (len(sent) - 1))
+
+
+@pytest.mark.parametrize("turn_s", PERIODS_S)
+def test_whatever_the_period_of_turns_a_held_command_is_not_too_old_and_moves_are_at_most_250_a_second(
+    turn_s: float,
+) -> None:
+    held, turns = HeldCommand(), [number * turn_s for number in range(500)]
+    rests = [now_s for now_s in turns if held.due(REST, 7, now_s) is not None]
+    assert {round(1e3 * (later - earlier)) for earlier, later in pairwise(rests)} == {
+        max(round(1e3 * turn_s), round(1e3 * turn_s) * math.floor(LONGEST_HELD_S / turn_s + 1e-9))
+    }
+    moves = [
+        now_s for number, now_s in enumerate(turns) if held.due(replace(REST, r2=0.37 * number % 1.0), 7, 60.0 + now_s)
+    ]
+    assert all(later - earlier >= TURN_S - 1e-9 for earlier, later in pairwise(moves)) or turn_s > TURN_S
+    assert len(moves) >= min(1.0 / TURN_S, 1.0 / turn_s) * turns[-1]
 
 
 def test_five_commands_of_resting_hands_may_come_late_before_the_robot_side_stops_the_arm() -> None:
     """Commands may be late because each connection in turn waits for a lost packet, and a turn may be 3 ms late."""
     held = HeldCommand()
-    sent = [turn * MOTION_PERIOD_S for turn in range(250) if held.due(REST, 7, turn * MOTION_PERIOD_S) is not None]
+    sent = [turn * TURN_S for turn in range(250) if held.due(REST, 7, turn * TURN_S) is not None]
     gap_s = SafetySettings().gap_s
     assert all(later - earlier < gap_s - 0.003 for earlier, later in zip(sent, sent[6:], strict=False))
 
