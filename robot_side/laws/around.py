@@ -94,13 +94,12 @@ class ProbeLooks:
         if self._since_s == math.inf:
             return []
         leads = np.array([[motion.ahead_m_s > -_RETREATS_M_S], [motion.ahead_m_s < _RETREATS_M_S]])
-        discarded = self._at_s < self._since_s
         waited = (self._turned_s - self._at_s) / np.where(leads, PERIOD_S, _SELDOM * PERIOD_S)
+        waited[self._at_s > self._moved_s] = -np.inf
         # A discarded look is due again at once: until then the operator side has the old map.
-        waited = np.where(discarded, waited + 2.0, np.where(self._at_s <= self._moved_s, waited, -np.inf)).ravel()
-        most = math.ceil(2.0 * PROBES * min(passed_s / PERIOD_S, 1.0))
-        first = np.argsort(-waited, kind="stable")[:most]
-        return [divmod(one, PROBES) for one in first[waited[first] >= 1.0 - _ROUNDING].tolist()]
+        waited[self._at_s < self._since_s] = np.inf
+        first = np.argsort(-waited, axis=None, kind="stable")[: math.ceil(2.0 * PROBES * min(passed_s / PERIOD_S, 1.0))]
+        return [divmod(one, PROBES) for one in first.tolist() if waited.flat[one] >= 1.0 - _ROUNDING]
 
     def add(self, side: int, number: int, direction: FloatArray, began_m: float, onsets_m: FloatArray) -> None:
         """Store a probe's newest look. onsets_m (2, 8): fast and slow list."""

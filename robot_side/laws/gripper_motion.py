@@ -1,5 +1,6 @@
 """Motion of the gripper, measured: the tool's velocities, and the fingers' motion from recent positions."""
 
+import math
 from collections import deque
 from dataclasses import dataclass, field
 from typing import Final
@@ -32,12 +33,8 @@ class GripperMotion:
     """Speed of the tool's point in any direction"""
     fingers_m_s: FloatArray | None
     """(m, 3) velocity of each sphere relative to the tool; None while the fingers rest"""
-
-    @property
-    def moves(self) -> bool:
-        """Whether the gripper or its fingers move."""
-        turns = float(self.turning_rad_s @ self.turning_rad_s) > _STILL_RAD_S**2
-        return turns or self.speed_m_s > STILL_M_S or self.fingers_m_s is not None
+    moves: bool
+    """Whether the gripper or its fingers move"""
 
 
 @dataclass
@@ -70,6 +67,8 @@ def gripper_motion(
 ) -> GripperMotion:
     """Return the gripper's motion at these rates of the joints (n,)."""
     twist = pose.tool_jacobian @ joint_velocities_rad_s
-    linear_m_s = twist[:3]
+    linear_m_s, turning_rad_s = twist[:3], twist[3:]
+    speed_m_s, rate_rad_s = math.sqrt(linear_m_s @ linear_m_s), math.sqrt(turning_rad_s @ turning_rad_s)
+    moves = speed_m_s > STILL_M_S or rate_rad_s > _STILL_RAD_S or fingers_m_s is not None
     ahead_m_s = float(pose.tool_rotation[:, 2] @ linear_m_s)
-    return GripperMotion(linear_m_s, twist[3:], ahead_m_s, float(np.sqrt(linear_m_s @ linear_m_s)), fingers_m_s)
+    return GripperMotion(linear_m_s, turning_rad_s, ahead_m_s, speed_m_s, fingers_m_s, moves)

@@ -50,10 +50,10 @@ def require_usable(situation: Situation, joints: int, now_s: float) -> None:
     ):
         if count != valid:
             raise ValueError(f"{name} = {count}; valid: {valid}, the number that the law was made for")
-    # One sum is not finite if any of its numbers is not, and is quicker than to look at each.
-    numbers = pose.tool_jacobian.sum() + pose.sphere_centers_m.sum() + pose.sphere_radii_m.sum() + rates.sum()
-    numbers += pose.tool_position_m.sum() + pose.tool_rotation.sum() + sum(situation.lateral)
-    if math.isfinite(numbers + situation.loop_age_s + now_s):
+    arrays = pose.tool_position_m, pose.tool_rotation, pose.tool_jacobian, pose.sphere_centers_m, pose.sphere_radii_m
+    # A sum of squares is finite only if all numbers are; this takes a third of the time of np.isfinite.
+    squares = sum(float(np.vdot(array, array)) for array in (*arrays, rates))
+    if math.isfinite(squares + sum(situation.lateral) + situation.loop_age_s + now_s):
         return
     for name in ("tool_position_m", "tool_rotation", "tool_jacobian", "sphere_centers_m", "sphere_radii_m"):
         require_finite(f"pose.{name}", getattr(pose, name))
