@@ -112,7 +112,7 @@ def unpacked(
 
 
 def _pack_stiffness(update: StiffnessUpdate) -> bytes:
-    l2, r2, horizon_m, told_m_s = update.l2, update.r2, update.horizon_m, update.told_m_s
+    l2, r2, horizon_m, commanded_m_s = update.l2, update.r2, update.horizon_m, update.commanded_m_s
     field = _STIFFNESS.pack(
         *_steps(l2.fast_m, horizon_m),
         *_steps(l2.slow_m, horizon_m),
@@ -121,7 +121,7 @@ def _pack_stiffness(update: StiffnessUpdate) -> bytes:
         *(l2.full_speed_m_s, l2.acceleration_m_s2, l2.displacement_m, l2.stiffness),
         *(r2.full_speed_m_s, r2.acceleration_m_s2, r2.displacement_m, r2.stiffness),
         update.speed_m_s,
-        math.nan if told_m_s is None else told_m_s,
+        math.nan if commanded_m_s is None else commanded_m_s,
         math.floor(horizon_m * _STEPS),
         math.ceil(8.0 * update.rumble),
         _STATES.index(update.state) + _STANDS * update.stands + _HINDERED * update.hindered,
@@ -133,7 +133,7 @@ def _pack_stiffness(update: StiffnessUpdate) -> bytes:
 def _unpack_stiffness(message: StiffnessOnWire) -> StiffnessUpdate:
     content = _STIFFNESS.unpack_from(message.field)
     behind = message.field[_STIFFNESS.size :]
-    speed_m_s, told_m_s, horizon, rumble, bits = content[40:]
+    speed_m_s, commanded_m_s, horizon, rumble, bits = content[40:]
     state = bits % _STANDS
     if state >= len(_STATES) or bits >= 2 * _HINDERED:
         raise ValueError(f"bits = {bits}; valid: a state from 0 to {len(_STATES) - 1}, and two flags above it")
@@ -150,7 +150,7 @@ def _unpack_stiffness(message: StiffnessOnWire) -> StiffnessUpdate:
         horizon_m,
         rumble / 8.0,
         _STATES[state],
-        told_m_s if told_m_s == told_m_s else None,  # noqa: PLR0124  # faster than a call
+        commanded_m_s if commanded_m_s == commanded_m_s else None,  # noqa: PLR0124  # faster than a call
         bool(bits & _STANDS),
         bool(bits & _HINDERED),
         _unpack_around(behind) if behind else None,

@@ -235,7 +235,7 @@ class StiffnessUpdate(Message, frozen=True, tag="stiffness"):
     rumble: float
     """Rumble, 0 to 1 in eighths: strength in the direction of the stick; 0 while the stick rests."""
     state: MotionState
-    told_m_s: float | None = None
+    commanded_m_s: float | None = None
     """Commanded speed along R2's direction: what remains of the newest command after joint limits; 0 if the command was
     discarded or stopped. None if unknown: the arm then counts as following the command."""
     stands: bool = False
@@ -247,8 +247,8 @@ class StiffnessUpdate(Message, frozen=True, tag="stiffness"):
 
     def __post_init__(self) -> None:
         in_range("speed_m_s", -FARTHEST_M, FARTHEST_M, self.speed_m_s)
-        if self.told_m_s is not None:
-            in_range("told_m_s", -FARTHEST_M, FARTHEST_M, self.told_m_s)
+        if self.commanded_m_s is not None:
+            in_range("commanded_m_s", -FARTHEST_M, FARTHEST_M, self.commanded_m_s)
         in_range("horizon_m", 0.0, FARTHEST_M, self.horizon_m)
         in_range("rumble", 0.0, 1.0, self.rumble)
 

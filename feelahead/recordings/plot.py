@@ -123,12 +123,12 @@ def _curves(axis: Any, joined: Table, times_s: FloatArray, *curves: tuple[str, f
     for column, factor, color, label in curves:
         values = factor * joined.numbers(column)
         if np.isfinite(values).any():
-            axis.plot(times_s, values, color=color, lw=0.8, ls="--" if label == "told" else "-", label=label)
+            axis.plot(times_s, values, color=color, lw=0.8, ls="--" if label == "commanded" else "-", label=label)
 
 
 def _speed(_: Any, axis: Any, joined: Table, times_s: FloatArray) -> None:
     measured = ("stiffness.speed_m_s", 1e3, _ORANGE, "measured")
-    _curves(axis, joined, times_s, measured, ("stiffness.told_m_s", 1e3, _GREY, "told"))
+    _curves(axis, joined, times_s, measured, ("stiffness.commanded_m_s", 1e3, _GREY, "commanded"))
     axis.axhline(0.0, color=_GREY, lw=0.5)
     axis.set(ylabel="speed (mm/s)", title="Speed along the approach")
 

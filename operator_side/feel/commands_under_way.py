@@ -61,7 +61,7 @@ class Report(NamedTuple):
     """v: speed along the direction in which R2 moves the gripper"""
     full_speed_m_s: float
     """v_max: speed that full travel commands"""
-    told_m_s: float | None = None
+    commanded_m_s: float | None = None
     """Speed that the robot side gives the newest command it had received, within its limits; None: as commanded"""
 
 
@@ -95,7 +95,7 @@ class CommandsUnderWay:
 
     - The command stamped `echo` has replaced all older ones, and the arm follows it. The arm's measured speed v is as
       near to that command as the arm could get. The report also has the speed that the robot side gives the
-      command (`told_m_s`): zero if the command came too late or the arm was stopped, less at a joint's limit.
+      command (`commanded_m_s`): zero if the command came too late or the arm was stopped, less at a joint's limit.
     - Commands after `echo` are under way. On a steady link they were sent after e, and a command sent at t is followed
       from T + (t - e) on. A command sent between `echo` and e is overdue, as delays have grown: it arrives at T at
       the earliest. So e is taken no later than the first command after `echo`.
@@ -185,7 +185,7 @@ class CommandsUnderWay:
 
     def _counting(self, now_s: float, report: Report) -> list[Command] | None:
         """List the commands in force from e to `now_s`, oldest first, then a last entry at `now_s`; None if unknown."""
-        echo_sent_s, held_s, speed_m_s, full_speed_m_s, told_m_s = report
+        echo_sent_s, held_s, speed_m_s, full_speed_m_s, commanded_m_s = report
         if not math.isfinite(speed_m_s):
             raise ValueError(f"speed_m_s = {speed_m_s}; valid: finite")
         if not (math.isfinite(full_speed_m_s) and full_speed_m_s > 0.0):
@@ -198,7 +198,7 @@ class CommandsUnderWay:
             return None
         followed, *under_way = self._from(echo_sent_s, now_s)
         since_s = min(echo_sent_s + held_s, under_way[0].sent_s if under_way else now_s)
-        travel = followed.travel if told_m_s is None else told_m_s / full_speed_m_s
+        travel = followed.travel if commanded_m_s is None else commanded_m_s / full_speed_m_s
         return [followed._replace(sent_s=since_s, travel=travel), *under_way, Command(now_s, 0.0)]
 
     def _from(self, since_s: float, until_s: float) -> list[Command]:

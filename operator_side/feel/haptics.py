@@ -171,4 +171,4 @@ class Haptics:
 
 def _report(felt: StiffnessUpdate) -> Report:
     header = felt.header
-    return Report(header.echo_sent_s, header.echo_held_s, felt.speed_m_s, felt.r2.full_speed_m_s, felt.told_m_s)
+    return Report(header.echo_sent_s, header.echo_held_s, felt.speed_m_s, felt.r2.full_speed_m_s, felt.commanded_m_s)

@@ -31,7 +31,7 @@ class Commanded(NamedTuple):
 
     velocity_rad_s: FloatArray
     """(n,)"""
-    told_m_s: float
+    commanded_m_s: float
     """Tool's speed along the approach axis"""
     undone: float
     """Share of the commanded motion that the tool will not make, 0 to 1"""
@@ -59,7 +59,7 @@ def commanded(
     linear, angular = tool_motion(command, settings)
     velocity, missed = np.empty(joint_positions_rad.size), np.zeros(3)
     lower, upper = limits.ends_rad
-    told_m_s = _command_loop(
+    commanded_m_s = _command_loop(
         *(pose.tool_rotation, pose.tool_jacobian, joint_positions_rad, limits.velocity_rad_s, lower, upper),
         *linear,
         *angular,
@@ -67,7 +67,7 @@ def commanded(
         velocity,
         missed,
     )
-    if math.isnan(told_m_s):
+    if math.isnan(commanded_m_s):
         if velocity.size != pose.tool_jacobian.shape[1]:
             raise ValueError(
                 f"joint_positions_rad has the shape {joint_positions_rad.shape}; valid: {pose.tool_jacobian.shape[1:]}"
@@ -75,7 +75,7 @@ def commanded(
         require_finite("tool_rotation", pose.tool_rotation)
         refuse(pose.tool_jacobian, np.array([*linear, *angular]), limits.velocity_rad_s)
     undone, cause, joint = missed.tolist()
-    return Commanded(velocity, told_m_s, undone, Cause(int(cause)) if cause else None, int(joint))
+    return Commanded(velocity, commanded_m_s, undone, Cause(int(cause)) if cause else None, int(joint))
 
 
 @inlined

@@ -62,10 +62,10 @@ class Touchdown:
         """Whether the object has just touched down"""
         return self.stands and self._time_s - self._since_s < _GIVES_WAY_S
 
-    def update(self, carried_n: float | None, height_m: float, told_m_s: float, time_s: float) -> None:
+    def update(self, carried_n: float | None, height_m: float, rises_m_s: float, time_s: float) -> None:
         """Take the load (None if unknown) and the tool's height, both measured at `time_s`.
 
-        told_m_s: commanded speed of the tool upwards since the last update.
+        rises_m_s: commanded speed of the tool upwards since the last update.
         """
         passed_s, sunk_m = time_s - self._time_s, self._height_m - height_m
         if passed_s <= 0.0:
@@ -81,12 +81,12 @@ class Touchdown:
             self._carried_n = self._usual_n = carried_n or 0.0
         elif carried_n is None:
             self._sinks_m_s += (sunk_m / passed_s - self._sinks_m_s) * -math.expm1(-passed_s / _SPEED_S)
-            sinks = told_m_s > -_SINKS_M_S or self._sinks_m_s > -_HARDLY * told_m_s
+            sinks = rises_m_s > -_SINKS_M_S or self._sinks_m_s > -_HARDLY * rises_m_s
             self._stalled_s = 0.0 if sinks else self._stalled_s + passed_s
         else:
             self._carried_n += (carried_n - self._carried_n) * -math.expm1(-passed_s / _NOISE_S)
             self._usual_n += (carried_n - self._usual_n) * -math.expm1(-passed_s / _USUAL_S)
         borne_n = self._usual_n - self._carried_n
         borne = borne_n > _BORNE_N + _BORNE_SHARE * max(0.0, self._usual_n)
-        if told_m_s < -_SINKS_M_S and (borne or self._stalled_s > _STALLED_S):
+        if rises_m_s < -_SINKS_M_S and (borne or self._stalled_s > _STALLED_S):
             self.stands, self._since_s, self._stalled_s = True, time_s, 0.0

@@ -30,7 +30,7 @@ class Motion:
         """following: judge of the arm's motion; a new one by default. assists: limit the speed along the triggers."""
         self.commanded_rad_s: FloatArray | None = None
         """(n,) commanded joint velocities; None: the arm is to stand still"""
-        self.told_m_s = self.rises_m_s = 0.0
+        self.commanded_m_s = self.rises_m_s = 0.0
         """Commanded speeds of the tool: in the direction in which R2 advances; and upwards (0 if nothing is held)"""
         self.hindrance = Hindrance()
         self.following = following or Following(limits)
@@ -53,7 +53,7 @@ class Motion:
         """
         command = permission.command
         if command is None or grip.touchdown.gives_way:
-            self.commanded_rad_s, self.told_m_s, self.rises_m_s = None, 0.0, 0.0
+            self.commanded_rad_s, self.commanded_m_s, self.rises_m_s = None, 0.0, 0.0
             if command is None:
                 self.hindrance.end(self.following.text)
             # Valid until the state's time: expiry between two physics steps would let a load sink, each time.
@@ -65,13 +65,13 @@ class Motion:
         if homeward is None:
             where = pose, state.joint_positions_rad, self._limits, self._settings
             motion = commanded(command, *where, stands=grip.touchdown.stands)
-            velocity, self.told_m_s = motion.velocity_rad_s, motion.told_m_s
+            velocity, self.commanded_m_s = motion.velocity_rad_s, motion.commanded_m_s
             self.hindrance.update(motion.undone, motion.cause, motion.joint)
         elif isinstance(homeward, str):
-            velocity, self.told_m_s = self._still, 0.0
+            velocity, self.commanded_m_s = self._still, 0.0
             self.hindrance.refuse(homeward)
         else:
-            velocity, self.told_m_s = homeward, float(pose.tool_rotation[:, 2] @ pose.tool_jacobian[:3] @ homeward)
+            velocity, self.commanded_m_s = homeward, float(pose.tool_rotation[:, 2] @ pose.tool_jacobian[:3] @ homeward)
             self.hindrance.end()
         if self.following.text is not None:
             self.hindrance.find(self.following.text)

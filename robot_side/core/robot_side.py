@@ -134,7 +134,7 @@ class RobotSide:
         sensed = parts.law.sense(situation, now_s)
         self.newest = sensed, situation
         begin("messages")
-        done = self.motion.told_m_s, grip.touchdown.stands, self.motion.hindrance.text is not None
+        done = self.motion.commanded_m_s, grip.touchdown.stands, self.motion.hindrance.text is not None
         outgoing = self.reports.outgoing(permission, situation, sensed, *done, now_s)
         holds_target = grip.index is not None and grip.index == sight.target
         found = permission.state, self.motion.commanded_rad_s, state, situation, sensed

@@ -49,13 +49,13 @@ class MapSchedule:
 def stiffness_message(
     receiver: Receiver,
     sensed: Sensed,
-    told_m_s: float,
+    commanded_m_s: float,
     state: MotionState,
     stands: bool = False,
     hindered: bool = False,
     around: Around | None = None,
 ) -> Outgoing:
-    """Return the stiffness message for `receiver`; told_m_s: commanded speed in the direction in which R2 advances.
+    """Return the stiffness message for `receiver`; commanded_m_s: commanded speed along R2's direction.
 
     stands: whether the held object stands on something. hindered: whether something keeps the arm from following.
     around: the map, if one is due in this message.
@@ -68,7 +68,7 @@ def stiffness_message(
         horizon_m=sensed.horizon_m,
         rumble=sensed.rumble,
         state=state,
-        told_m_s=min(max(told_m_s, -_FASTEST_M_S), _FASTEST_M_S),
+        commanded_m_s=min(max(commanded_m_s, -_FASTEST_M_S), _FASTEST_M_S),
         stands=stands,
         hindered=hindered,
         around=around,

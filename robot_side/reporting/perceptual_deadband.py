@@ -75,7 +75,7 @@ class StiffnessDeadband:
     def due(
         self,
         sensed: Sensed,
-        told_m_s: float,
+        commanded_m_s: float,
         state: MotionState,
         stands: bool,
         hindered: bool,
@@ -84,7 +84,7 @@ class StiffnessDeadband:
     ) -> bool:
         """Return whether a stiffness message leaves at `now_s`; if it does, it counts as received.
 
-        told_m_s: commanded speed from this tick on, in the direction in which R2 advances. command: the command from
+        commanded_m_s: commanded speed along R2's direction, from this tick on. command: the command from
         which that speed follows; None if nothing moves. stands, hindered: as in StiffnessUpdate.
         """
         obeyed, travel, by_operator = 0, 0.0, True
@@ -101,7 +101,7 @@ class StiffnessDeadband:
                 later_m_s = travel * belief.sensed.r2.full_speed_m_s
                 belief.target_m_s = belief.commanded_m_s if obeyed == belief.obeyed else later_m_s
                 return False
-        self._belief = _Belief(sensed, now_s, states, obeyed, told_m_s, told_m_s, sensed.speed_m_s, now_s)
+        self._belief = _Belief(sensed, now_s, states, obeyed, commanded_m_s, commanded_m_s, sensed.speed_m_s, now_s)
         return True
 
 

@@ -54,14 +54,14 @@ class Reports:
         permission: Permission,
         situation: Situation,
         sensed: Sensed,
-        told_m_s: float,
+        commanded_m_s: float,
         stands: bool,
         hindered: bool,
         now_s: float,
     ) -> list[Outgoing]:
         """Return the messages to operators that are due at `now_s`; see `stiffness_message`."""
         session = self._session
-        felt = sensed, told_m_s, permission.state, stands, hindered
+        felt = sensed, commanded_m_s, permission.state, stands, hindered
         outgoing = [Outgoing("haptics", *answer) for answer in session.take_answers(now_s)]
         if session.owner_peer is not None and self.felt.due(*felt, permission.command, now_s):
             self.stiffness_sent += 1

@@ -73,7 +73,7 @@ BY_HAND: dict[str, st.SearchStrategy[Any]] = {
     **dict.fromkeys(("tool_position_m",), st.tuples(finite, finite, finite)),
     **dict.fromkeys(("target_in_tool_m",), st.none() | st.tuples(finite, finite, finite)),
     **dict.fromkeys(("full_speed_m_s", "acceleration_m_s2"), st.floats(1e-6, 100.0)),
-    **dict.fromkeys(("told_m_s",), st.none() | stick),
+    **dict.fromkeys(("commanded_m_s",), st.none() | stick),
     **dict.fromkeys(
         ("around",),
         st.none()
@@ -314,7 +314,7 @@ REFUSED: tuple[tuple[Any, dict[str, Any], str], ...] = (
     (VALID[2], {"rumble": 2.0}, "rumble = 2.0"),
     (VALID[2], {"speed_m_s": math.nan}, "speed_m_s = nan"),
     (VALID[2], {"horizon_m": -0.1}, "horizon_m = -0.1"),
-    (VALID[2], {"told_m_s": math.inf}, "told_m_s = inf"),
+    (VALID[2], {"commanded_m_s": math.inf}, "commanded_m_s = inf"),
     (field(onsets(0.1)), {"fast_m": onsets(0.2, 0.1)}, "fast_m = .* each at least as long as the one before"),
     (field(onsets(0.1)), {"slow_m": onsets(0.0, math.nan)}, "slow_m = nan"),
     (field(onsets(0.1)), {"slow_m": onsets(0.0, math.inf)}, "slow_m = inf"),

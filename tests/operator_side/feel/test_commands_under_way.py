@@ -42,9 +42,9 @@ def displacement(
     echo_held_s: float = 0.0,
     speed_m_s: float = 0.0,
     acceleration_m_s2: float = 3.0,
-    told_m_s: float | None = None,
+    commanded_m_s: float | None = None,
 ) -> Displacement:
-    report = Report(echo_sent_s, echo_held_s, speed_m_s, FULL_M_S, told_m_s)
+    report = Report(echo_sent_s, echo_held_s, speed_m_s, FULL_M_S, commanded_m_s)
     found = commands.displacement(now_s, report, acceleration_m_s2)
     assert found is not None
     return found
@@ -96,7 +96,7 @@ def test_the_speed_given_to_the_newest_command_replaces_the_speed_asked_for(
 ) -> None:
     echo = data.draw(st.integers(0, len(travels) - 1))
     moment = len(travels) * PERIOD_S, echo * PERIOD_S, 0.001, speed
-    found = displacement(sent_every(travels), *moment, told_m_s=gives * FULL_M_S)
+    found = displacement(sent_every(travels), *moment, commanded_m_s=gives * FULL_M_S)
     travels[echo] = gives
     assert found == pytest.approx(displacement(sent_every(travels), *moment), abs=1e-12)
 

@@ -192,11 +192,11 @@ def test_it_is_the_twist_resolved_and_what_joints_at_their_ends_let_through(
     stays = ((positions <= limits.ends_rad[0] + 0.002) & (expected < 0.0)) | (
         (positions >= limits.ends_rad[1] - 0.002) & (expected > 0.0)
     )
-    told_m_s = rotation[:, 2] @ jacobian[:3] @ np.where(stays, 0.0, expected)
+    commanded_m_s = rotation[:, 2] @ jacobian[:3] @ np.where(stays, 0.0, expected)
 
     found = commanded(hands, pose_with(jacobian, rotation), positions, limits, SETTINGS)
     np.testing.assert_allclose(found.velocity_rad_s, expected, rtol=1e-12, atol=1e-12)
-    assert found.told_m_s == pytest.approx(told_m_s, abs=1e-12)
+    assert found.commanded_m_s == pytest.approx(commanded_m_s, abs=1e-12)
     # A turn counts as the speed 0.2 m from the tool's point.
     asked = np.concatenate([linear, 0.2 * angular])
     missed = asked - np.concatenate([jacobian[:3], 0.2 * jacobian[3:]]) @ np.where(stays, 0.0, expected)

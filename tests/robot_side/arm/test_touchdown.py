@@ -31,14 +31,14 @@ class Arm:
         """Rise (> 0) or sink, but sink no more after a contact; return when a new contact is noticed, if any."""
         for tick in range(round(duration_s / TICK_S)):
             stands = self.touchdown.stands
-            told_m_s = max(0.0, speed_m_s) if stands else speed_m_s
+            rises_m_s = max(0.0, speed_m_s) if stands else speed_m_s
             self.now_s += TICK_S
-            self.meant_m += told_m_s * TICK_S
+            self.meant_m += rises_m_s * TICK_S
             self.height_m = max(0.0, self.meant_m)
             borne_n = self._weight_n + self.pressed_n if self.meant_m <= 0.0 else 0.0
             jolt = -jolt_n if tick < 12 else 0.0  # Time that an arm takes to its speed.
             carried = self._weight_n - borne_n + jolt + self._noise_n * self._random.normal()
-            self.touchdown.update(carried if self._measures else None, self.height_m, told_m_s, self.now_s)
+            self.touchdown.update(carried if self._measures else None, self.height_m, rises_m_s, self.now_s)
             if self.touchdown.stands and not stands:
                 return self.now_s
         return None
@@ -103,8 +103,8 @@ def test_a_thing_that_is_gripped_where_it_stands_is_lifted_freely_and_noticed_wh
 def test_a_hard_contact_is_forgotten_once_the_tool_has_risen() -> None:
     touchdown = Touchdown()
     stands = list[bool]()
-    for carried, height_m, told_m_s in ((2.0, 0.05, 0.0), (-500.0, 0.05, -0.1), (2.0, 0.06, 0.1), (2.0, 0.059, -0.1)):
-        touchdown.update(carried, height_m, told_m_s, 1.0 + 0.01 * len(stands))
+    for carried, height_m, rises_m_s in ((2.0, 0.05, 0.0), (-500.0, 0.05, -0.1), (2.0, 0.06, 0.1), (2.0, 0.059, -0.1)):
+        touchdown.update(carried, height_m, rises_m_s, 1.0 + 0.01 * len(stands))
         stands.append(touchdown.stands)
     assert stands == [False, True, False, False]
 

@@ -48,7 +48,7 @@ def test_the_arm_goes_home_while_asked_to_and_stops_at_once_when_not(bench: Benc
     bench.drive(3.0, operator, home=1.0)
     assert off_rad(bench) < 5e-3
     assert bench.robot.motion.hindrance.text is None
-    assert operator.felt[-1].told_m_s == pytest.approx(0.0, abs=1e-3)
+    assert operator.felt[-1].commanded_m_s == pytest.approx(0.0, abs=1e-3)
 
 
 def test_a_lower_share_is_slower(bench: Bench) -> None:

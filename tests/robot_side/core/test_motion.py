@@ -44,9 +44,9 @@ def test_the_arm_is_told_what_is_said(permitted: bool, gives_way: bool, monkeypa
     if permitted and not gives_way:
         assert motion.commanded_rad_s is velocity
         assert np.abs(velocity).max() > 0.01
-        assert motion.told_m_s == pytest.approx(0.1, rel=0.01)
+        assert motion.commanded_m_s == pytest.approx(0.1, rel=0.01)
         assert (until_s, told_gripper) == (1.1, (1.0, 1.1))
     else:
         assert motion.commanded_rad_s is None
         assert (not velocity.any(), until_s, told_gripper) == (True, state.time_s, (0.0, now_s))
-        assert motion.told_m_s == 0.0
+        assert motion.commanded_m_s == 0.0

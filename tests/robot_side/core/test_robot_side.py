@@ -122,45 +122,45 @@ def test_what_the_law_finds_is_what_is_sent(bench: Bench, listening: Listening) 
     assert felt.rumble == 0.0
 
 
-def told_m_s(operator: Operator) -> float:
-    told = operator.felt[-1].told_m_s
-    assert told is not None
-    return told
+def commanded_m_s(operator: Operator) -> float:
+    found = operator.felt[-1].commanded_m_s
+    assert found is not None
+    return found
 
 
 def test_an_operator_hears_what_its_command_gets_and_0_where_it_gets_nothing(bench: Bench) -> None:
     operator = bench.join(2)
     start = bench.tool_m
     bench.drive(0.5, operator, r2=0.4)
-    assert told_m_s(operator) == 0.0  # Not armed.
+    assert commanded_m_s(operator) == 0.0  # Not armed.
     assert np.linalg.norm(bench.tool_m - start) < 2e-3
     bench.cruise(operator, 0.1)
-    assert told_m_s(operator) == pytest.approx(0.1, rel=0.01)
+    assert commanded_m_s(operator) == pytest.approx(0.1, rel=0.01)
     bench.drive(0.02, operator, l2=0.4)
-    assert told_m_s(operator) == pytest.approx(-0.1, rel=0.01)
+    assert commanded_m_s(operator) == pytest.approx(-0.1, rel=0.01)
     bench.drive(0.02, operator, r2=0.4, run=False)
-    assert told_m_s(operator) == 0.0
+    assert commanded_m_s(operator) == 0.0
     bench.drive(0.02, operator, r2=0.4)
-    assert told_m_s(operator) > 0.0
+    assert commanded_m_s(operator) > 0.0
     bench.drive(0.02, operator, r2=0.4, emergency_stop=True)
-    assert told_m_s(operator) == 0.0
+    assert commanded_m_s(operator) == 0.0
 
 
 def test_an_operator_hears_that_a_joint_is_at_its_end(bench: Bench) -> None:
     operator = bench.join(2)
     bench.cruise(operator, 0.1)
-    free = told_m_s(operator)
+    free = commanded_m_s(operator)
     limits = bench.robot.motion._limits
     assert limits.lower_rad is not None
     here, ends = bench.arm.state(bench.now_s).joint_positions_rad, limits.lower_rad.copy()
     ends[2] = here[2]  # The elbow, which stretches as the tool advances.
     bench.robot.motion._limits = replace(limits, lower_rad=ends)
     bench.drive(KEEP_ALIVE_S, operator, r2=0.4)
-    assert told_m_s(operator) < 0.9 * free
+    assert commanded_m_s(operator) < 0.9 * free
     assert operator.felt[-1].hindered
     assert bench.robot.status(bench.now_s).hindrance == "joint 3 at its limit"
     bench.drive(KEEP_ALIVE_S, operator, l2=0.4)
-    assert told_m_s(operator) == pytest.approx(-free, rel=0.01)
+    assert commanded_m_s(operator) == pytest.approx(-free, rel=0.01)
     assert not operator.felt[-1].hindered
 
 

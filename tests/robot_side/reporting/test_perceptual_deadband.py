@@ -41,23 +41,29 @@ class Run:
 
     def __init__(self, left_m: float, **options: Any) -> None:
         self.deadband = StiffnessDeadband(**options)
-        self.left_m, self.speed_m_s, self.told_m_s = left_m, 0.0, 0.0
+        self.left_m, self.speed_m_s, self.commanded_m_s = left_m, 0.0, 0.0
         self.now_s, self.sent_s = 0.0, [-math.inf]
         self.believed_m, self.moved_m, self.believed_m_s = left_m, 0.0, 0.0
 
-    def tick(self, told_m_s: float = 0.0, wall_m_s: float = 0.0, **how: Any) -> bool:
+    def tick(self, commanded_m_s: float = 0.0, wall_m_s: float = 0.0, **how: Any) -> bool:
         self.now_s += TICK_S
-        moved_m, self.speed_m_s = follow(0.0, self.speed_m_s, self.told_m_s, A_M_S2, TICK_S)
-        self.moved_m, self.believed_m_s = follow(self.moved_m, self.believed_m_s, self.told_m_s, A_M_S2, TICK_S)
+        moved_m, self.speed_m_s = follow(0.0, self.speed_m_s, self.commanded_m_s, A_M_S2, TICK_S)
+        self.moved_m, self.believed_m_s = follow(self.moved_m, self.believed_m_s, self.commanded_m_s, A_M_S2, TICK_S)
         self.left_m -= moved_m + wall_m_s * TICK_S
-        self.told_m_s = told_m_s
+        self.commanded_m_s = commanded_m_s
         state: MotionState = how.get("state", "armed")
         compensation: Compensation = how.get("compensation", "operator")
-        travel = told_m_s / FULL_M_S
+        travel = commanded_m_s / FULL_M_S
         header = Header(1, 1 + round(1e3 * self.now_s), self.now_s)
         command = MotionCommand(header, max(0.0, -travel), max(0.0, travel), run=True, compensation=compensation)
         now = how.get("now") or sensed(self.left_m, self.speed_m_s)
-        felt = now, how.get("made_of_it_m_s", told_m_s), state, how.get("stands", False), how.get("hindered", False)
+        felt = (
+            now,
+            how.get("made_of_it_m_s", commanded_m_s),
+            state,
+            how.get("stands", False),
+            how.get("hindered", False),
+        )
         due = self.deadband.due(*felt, command, self.now_s)
         if due:
             self.sent_s.append(self.now_s)
@@ -81,9 +87,9 @@ moves = st.lists(st.tuples(st.integers(1, 60), st.floats(-0.25, 0.25), st.floats
 @settings(derandomize=True, deadline=None, max_examples=100)
 def test_the_receiver_is_never_wrong_by_more_than_can_be_felt(left_m: float, moves: Any) -> None:
     run = Run(left_m)
-    for ticks, told_m_s, wall_m_s in moves:
+    for ticks, commanded_m_s, wall_m_s in moves:
         for _ in range(ticks):
-            due = run.tick(told_m_s, wall_m_s)
+            due = run.tick(commanded_m_s, wall_m_s)
             deadband_m = max(1e-3, 0.02 * run.left_m)
             if run.left_m < FAR_M - 0.01:
                 assert run.nearer_m <= 0.25 * deadband_m + 1e-9
@@ -91,7 +97,7 @@ def test_the_receiver_is_never_wrong_by_more_than_can_be_felt(left_m: float, mov
                     assert run.nearer_m >= -deadband_m - 1e-9
             assert run.now_s - run.sent_s[-1] < KEEP_ALIVE_S + 1e-9
             if due and run.since_s < WRITE_S - TICK_S and len(run.sent_s) > 2:
-                assert wall_m_s > 0.0 or told_m_s != 0.0  # Only for a wall nearer than believed.
+                assert wall_m_s > 0.0 or commanded_m_s != 0.0  # Only for a wall nearer than believed.
 
 
 @pytest.mark.parametrize(("turn_ms", "leaves_ms"), [(1, 20), (2, 20), (4, 20), (5, 20), (8, 16), (10, 20), (20, 20)])
