@@ -50,7 +50,7 @@ class OperatorSide:
         self.settings = settings = settings or CoreSettings()
         link = settings.seed, settings.asymmetry_s, settings.tick_period_s
         self.link = LinkEnd("operator", epoch, clock_domain, *link)
-        self.felt = NewestStiffness(settings.seed)
+        self.newest_stiffness = NewestStiffness(settings.seed)
         self.screen: Telemetry | None = None
         """Newest telemetry of the robot side; None before the first."""
         choices = Choices(settings.speed_scale, settings.stick_frame)
@@ -84,7 +84,7 @@ class OperatorSide:
     @property
     def stiffness(self) -> StiffnessUpdate | None:
         """Newest stiffness message; None before the first and once it has expired."""
-        return self.felt.update
+        return self.newest_stiffness.update
 
     def receive(self, payload: bytes, now_s: float) -> None:
         """Take one control payload from the robot side."""
@@ -114,15 +114,15 @@ class OperatorSide:
         elif isinstance(message, LeaseNotice) and arrival.fresh:
             self._follow(message, now_s)
 
-    def _feel(self, felt: StiffnessUpdate, arrival: Arrival, now_s: float) -> None:
+    def _feel(self, update: StiffnessUpdate, arrival: Arrival, now_s: float) -> None:
         if not arrival.copy:
-            self.felt.note(felt, arrival)
-            self.haptics.take_map(felt)
+            self.newest_stiffness.note(update, arrival)
+            self.haptics.keep_map(update)
         if arrival.fresh:
             self._look(now_s)  # first, so that a field that has expired counts as lost even if a new one arrives now
             self._blindness.end()
-            self.felt.apply(felt, arrival, now_s)
-            self.hands.see(armed=felt.state == "armed", now_s=now_s)
+            self.newest_stiffness.apply(update, arrival, now_s)
+            self.hands.see(armed=update.state == "armed", now_s=now_s)
 
     def _follow(self, notice: LeaseNotice, now_s: float) -> None:
         if self._standing.follow(notice, now_s):
@@ -189,7 +189,7 @@ class OperatorSide:
         """Return the messages to send now: a command if one is due; Hellos if there is none or the link is down."""
         self._look(now_s)
         self._standing.expire(now_s)
-        linked = self.felt.within(2 * HEARTBEAT_PERIOD_S, now_s)
+        linked = self.newest_stiffness.within(2 * HEARTBEAT_PERIOD_S, now_s)
         messages: list[ToRobot] = []
         lease, intent = self.lease, self._meant(now_s)
         if intent is None or lease is None:
@@ -222,35 +222,35 @@ class OperatorSide:
 
     def _look(self, now_s: float) -> None:
         """Forget an expired stiffness message; an operator with the lease is blind from then on."""
-        if self.felt.expired(now_s) and self._standing.owns:
+        if self.newest_stiffness.expired(now_s) and self._standing.owns:
             self._blindness.lose(now_s)
 
     def feel_now(self, now_s: float) -> Feel | None:
         """Return the effects to write to the controller now; None without a change, or while a change must wait."""
         self._look(now_s)
-        felt, intent = self.stiffness, self.hands.present(now_s)
-        if felt is not None and felt.state != "armed":
-            felt = None
+        update, intent = self.stiffness, self.hands.present(now_s)
+        if update is not None and update.state != "armed":
+            update = None
         pulled = (0.0, 0.0) if intent is None else (intent.l2, intent.r2)
-        feel = self.haptics.due(felt, pulled, self._blindness, now_s)
+        feel = self.haptics.due(update, pulled, self._blindness, now_s)
         for one in self._listeners:
             one.on_output(feel, now_s)
         return feel
 
     def status(self, now_s: float) -> OperatorStatus:
         """Return the status, without the fields that only the process knows."""
-        mean_s, screen, felt = self.link.delay.mean, self.screen, self.stiffness
+        mean_s, screen, update = self.link.delay.mean, self.screen, self.stiffness
         intent, rendering = self.hands.present(now_s), self.haptics.rendering
-        order, linked = -1 if self.settings.swap_sides else 1, self.felt.within(STIFFNESS_EXPIRES_S, now_s)
-        left, right = ((None, None) if felt is None else (felt.l2.stiffness, felt.r2.stiffness))[::order]
+        order, linked = -1 if self.settings.swap_sides else 1, self.newest_stiffness.within(STIFFNESS_EXPIRES_S, now_s)
+        left, right = ((None, None) if update is None else (update.l2.stiffness, update.r2.stiffness))[::order]
         left_pulled, right_pulled = ((None, None) if intent is None else (intent.l2, intent.r2))[::order]
-        link = self._standing.status_fields(now_s, linked=linked, heard=self.felt.count > 0)
+        link = self._standing.status_fields(now_s, linked=linked, heard=self.newest_stiffness.count > 0)
         seen = screen if link["link"] is LinkState.UP else None
         centre_m = None if seen is None else seen.target_in_tool_m
         return OperatorStatus(
             **link,
-            state=None if felt is None else felt.state,
-            stopped_because=self._standing.stop_reason if self.felt.stopped else None,
+            state=None if update is None else update.state,
+            stopped_because=self._standing.stop_reason if self.newest_stiffness.stopped else None,
             l2=left,
             r2=right,
             l2_pulled=left_pulled,
@@ -262,7 +262,7 @@ class OperatorSide:
             stick_frame=self.hands.choices.stick_frame,
             feel=self._blindness.sight,
             delay_ms=None if mean_s is None else 1e3 * mean_s,
-            stands=None if felt is None else felt.stands,
+            stands=None if update is None else update.stands,
             target=UNSET if seen is None else seen.target,
             target_centre_mm=None if centre_m is None else 1e3 * math.hypot(*centre_m),
             holding=None if seen is None else seen.holding,
@@ -274,7 +274,7 @@ class OperatorSide:
         """Return the operator side's part of the run's summary."""
         return {
             "messages": {
-                "stiffness_received": self.felt.count,
+                "stiffness_received": self.newest_stiffness.count,
                 "motion_sent": self.commands.sent,
                 "rejected": self.rejected,
                 "stale": self.link.stale,
@@ -290,7 +290,7 @@ class OperatorSide:
                 "round_trip": self.link.round_trip.summary_ms(),
             },
             "gaps": {"to_operator": self.link.gaps},
-            "driving_delay_ms": {"to_operator": self.felt.driving_delay.summary_ms()},
-            "applied_age_ms": {"to_operator": self.felt.applied_age.summary_ms()},
+            "driving_delay_ms": {"to_operator": self.newest_stiffness.driving_delay.summary_ms()},
+            "applied_age_ms": {"to_operator": self.newest_stiffness.applied_age.summary_ms()},
             "offset_ms": {"operator": self.link.offset_summary_ms()},
         }

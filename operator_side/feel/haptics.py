@@ -88,21 +88,21 @@ class Haptics:
         self._commanding = False
 
     def due(
-        self, felt: StiffnessUpdate | None, pulled: tuple[float, float], blindness: Blindness, now_s: float
+        self, update: StiffnessUpdate | None, pulled: tuple[float, float], blindness: Blindness, now_s: float
     ) -> Feel | None:
         """Return the parts to write to the controller now; None if nothing has changed, or while a change must wait.
 
-        felt: the newest stiffness message; None without one, or while the arm is not armed. pulled: calibrated travel
+        update: the newest stiffness message; None without one, or while the arm is not armed. pulled: calibrated travel
         of the trigger that retreats, and of the one that advances.
         """
         if not self._enabled:
             return None
-        aside = None if felt is None else self._aside(felt, now_s)
-        known = None if felt is None else self._displacement(felt, now_s)
-        self.without_history += felt is not None and known is None and self._compensation == "operator"
-        wanted = self.rendering.render(felt, pulled, known, now_s, aside)
+        aside = None if update is None else self._aside(update, now_s)
+        known = None if update is None else self._displacement(update, now_s)
+        self.without_history += update is not None and known is None and self._compensation == "operator"
+        wanted = self.rendering.render(update, pulled, known, now_s, aside)
         if blindness.light is not None:
-            rumble = blindness.rumble(now_s) if felt is None else wanted.rumble
+            rumble = blindness.rumble(now_s) if update is None else wanted.rumble
             wanted = dataclasses.replace(wanted, rumble=rumble, light=blindness.light)
         if wanted == self._written:
             return None
@@ -112,34 +112,34 @@ class Haptics:
         self._written, self.writes = shown, self.writes + 1
         return shown if before is None else shown.change_from(before)
 
-    def _displacement(self, felt: StiffnessUpdate, now_s: float) -> Displacement | None:
+    def _displacement(self, update: StiffnessUpdate, now_s: float) -> Displacement | None:
         """Compute δ and w by our commands under way; None if unknown, or if the robot side compensates."""
         if self._compensation == "robot":
             return None
-        return self._commands.displacement(now_s, _report(felt), felt.r2.acceleration_m_s2)
+        return self._commands.displacement(now_s, _report(update), update.r2.acceleration_m_s2)
 
-    def take_map(self, felt: StiffnessUpdate) -> None:
-        """Keep `felt` if its map is newer than the known one, even if `felt` is late: few messages have maps."""
+    def keep_map(self, update: StiffnessUpdate) -> None:
+        """Keep `update` if its map is newer than the known one, even if `update` is late: few messages have maps."""
         known = self._mapped
-        newer = known is None or known.header.epoch != felt.header.epoch or known.header.sent_s < felt.header.sent_s
-        if felt.around is not None and newer:
-            self._mapped, self._traced_s = felt, -math.inf
+        newer = known is None or known.header.epoch != update.header.epoch or known.header.sent_s < update.header.sent_s
+        if update.around is not None and newer:
+            self._mapped, self._traced_s = update, -math.inf
 
-    def _aside(self, felt: StiffnessUpdate, now_s: float) -> CourseOnMap | None:
+    def _aside(self, update: StiffnessUpdate, now_s: float) -> CourseOnMap | None:
         """Return the gripper's course on the newest map; None while the sticks rest, or without a map.
 
         The result is kept for WRITE_S, so that a path is traced only once for each write to the controller.
         """
         if not 0.0 <= now_s - self._traced_s < WRITE_S:
-            self._traced, self._traced_s = self._newest_aside(felt, now_s), now_s
+            self._traced, self._traced_s = self._newest_aside(update, now_s), now_s
         return self._traced
 
-    def _newest_aside(self, felt: StiffnessUpdate, now_s: float) -> CourseOnMap | None:
+    def _newest_aside(self, update: StiffnessUpdate, now_s: float) -> CourseOnMap | None:
         mapped = self._mapped
         if mapped is None or mapped.around is None or self._compensation == "robot":
             return None
         header = mapped.header
-        if header.epoch != felt.header.epoch or felt.header.sent_s - header.sent_s > MAP_EXPIRES_S:
+        if header.epoch != update.header.epoch or update.header.sent_s - header.sent_s > MAP_EXPIRES_S:
             self._mapped = None
             return None
         course = self._commands.course(now_s, _report(mapped), mapped.around.changes_s())
@@ -147,16 +147,16 @@ class Haptics:
             return None
         return CourseOnMap(mapped.around, mapped.horizon_m, course, self._commands.sticks_at(now_s))
 
-    def needed_m(self, felt: StiffnessUpdate, pulled: tuple[float, float], now_s: float) -> tuple[float, float]:
+    def needed_m(self, update: StiffnessUpdate, pulled: tuple[float, float], now_s: float) -> tuple[float, float]:
         """Compute D_z of `feel/zones.py` at the present travel, for the retreating and for the advancing trigger.
 
         pulled: calibrated travel of the trigger that retreats, and of the one that advances.
         """
-        back, forth = moving_along(felt, self._displacement(felt, now_s))
+        back, forth = moving_along(update, self._displacement(update, now_s))
         (retreating, advancing), horizon_s = (self._scale * travel for travel in pulled), self._settings.horizon_s
         return (
-            needed_m(felt.l2, max(0.0, retreating - advancing) * felt.l2.full_speed_m_s, back, horizon_s),
-            needed_m(felt.r2, max(0.0, advancing - retreating) * felt.r2.full_speed_m_s, forth, horizon_s),
+            needed_m(update.l2, max(0.0, retreating - advancing) * update.l2.full_speed_m_s, back, horizon_s),
+            needed_m(update.r2, max(0.0, advancing - retreating) * update.r2.full_speed_m_s, forth, horizon_s),
         )
 
     @property
@@ -169,6 +169,8 @@ class Haptics:
         return self.rendering.summary() | {"writes": self.writes, "without_history": self.without_history}
 
 
-def _report(felt: StiffnessUpdate) -> Report:
-    header = felt.header
-    return Report(header.echo_sent_s, header.echo_held_s, felt.speed_m_s, felt.r2.full_speed_m_s, felt.commanded_m_s)
+def _report(update: StiffnessUpdate) -> Report:
+    header = update.header
+    return Report(
+        header.echo_sent_s, header.echo_held_s, update.speed_m_s, update.r2.full_speed_m_s, update.commanded_m_s
+    )

@@ -153,37 +153,37 @@ class TriggerRendering:
 
     def render(
         self,
-        felt: StiffnessUpdate | None,
+        update: StiffnessUpdate | None,
         pulled: tuple[float, float],
         known: Displacement | None,
         now_s: float,
         aside: CourseOnMap | None = None,
     ) -> Feel:
-        """Render both triggers and the motors at `now_s`; RELEASED, without a gradual fall, if `felt` is None.
+        """Render both triggers and the motors at `now_s`; RELEASED, without a gradual fall, if `update` is None.
 
         pulled: present calibrated travel of the trigger that retreats, and of the one that advances. known: δ and w by
         our commands under way; None to use the robot side's. aside: course by the sticks on the map; None to render
         what is straight ahead.
         """
-        if felt is None:
+        if update is None:
             self.l2.release()
             self.r2.release()
             return RELEASED
         retreating, advancing = (self.r2, self.l2) if self._swap_sides else (self.l2, self.r2)
-        (back, forth), scale = moving_along(felt, known), self._scale
+        (back, forth), scale = moving_along(update, known), self._scale
         strengths = (
-            retreating.render(felt.l2, felt.horizon_m, scale * pulled[1], back, now_s, aside, forth=False),
-            advancing.render(felt.r2, felt.horizon_m, scale * pulled[0], forth, now_s, aside),
+            retreating.render(update.l2, update.horizon_m, scale * pulled[1], back, now_s, aside, forth=False),
+            advancing.render(update.r2, update.horizon_m, scale * pulled[0], forth, now_s, aside),
         )
         l2, r2 = reversed(strengths) if self._swap_sides else strengths
-        if felt.stands and not self._stands:
+        if update.stands and not self._stands:
             self._pulses, self._pulsed_s = STANDS, now_s
-        elif felt.hindered and not self._hindered:
+        elif update.hindered and not self._hindered:
             self._pulses, self._pulsed_s = HINDERED, now_s
-        self._stands, self._hindered = felt.stands, felt.hindered
+        self._stands, self._hindered = update.stands, update.hindered
         (drive, pulses_s), since_s = self._pulses, now_s - self._pulsed_s
         pulses = any(begin_s <= since_s < end_s for begin_s, end_s in pulses_s)
-        return Feel(l2=l2, r2=r2, rumble=Rumble(felt.rumble, drive if pulses else 0.0))
+        return Feel(l2=l2, r2=r2, rumble=Rumble(update.rumble, drive if pulses else 0.0))
 
     def zones(self) -> dict[str, Any]:
         """Return, for each of the controller's triggers, its first stiff zone and its maximum strength in the run."""

@@ -41,14 +41,14 @@ def operator_facts(
 
     status: `core.status(now_s)`, completed with the fields that only the process knows.
     """
-    felt, written, lease = core.stiffness, core.haptics.written, core.lease
+    update, written, lease = core.stiffness, core.haptics.written, core.lease
     pulled = [status.l2_pulled, status.r2_pulled]
     order = -1 if core.settings.swap_sides else 1
     needed: list[float | None] = [None, None]
-    fields = [None, None] if felt is None else [felt.l2, felt.r2][::order]
-    if felt is not None:
+    fields = [None, None] if update is None else [update.l2, update.r2][::order]
+    if update is not None:
         back, forth = (travel or 0.0 for travel in pulled[::order])
-        needed = list(core.haptics.needed_m(felt, (back, forth), now_s)[::order])
+        needed = list(core.haptics.needed_m(update, (back, forth), now_s)[::order])
     raw = (0.0, 0.0) if core.intent is None else core.intent.raw
     triggers = []
     for k, (strengths, rendered) in enumerate(
@@ -82,7 +82,7 @@ def operator_facts(
         to_operator=_delay("", (there for _, there, _ in recent)),
         to_robot=_delay(around.asked_to_robot, (_back(there, both) for _, there, both in recent)),
         round_trip_ms=None if offset.round_trip_s is None else 1e3 * offset.round_trip_s,
-        field_age_ms=1e3 * (now_s - core.felt.received_s) if core.felt.count else None,
+        field_age_ms=1e3 * (now_s - core.newest_stiffness.received_s) if core.newest_stiffness.count else None,
         hands=around.hands,
         may_tune=lease is not None and lease.may_tune,
         probability=None if lease is None else lease.probability,

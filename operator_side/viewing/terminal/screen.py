@@ -81,9 +81,9 @@ def _banner(view: LiveView, age_s: float, width: int) -> Text:
 def _standing(facts: OperatorFacts, view: LiveView) -> list[Text]:
     """Draw figures of the link over the last second, of the nearest object, the target and the held object."""
     status, robot, known = view.operator, view.robot, view.scene
-    felt = {} if status.feel in (None, Sight.SEEING) else {"feel": words(status.feel)}
+    feel = {} if status.feel in (None, Sight.SEEING) else {"feel": words(status.feel)}
     who = {"lease": lease_words(status.owner), "hands": words(facts.hands), "controller": words(status.controller)}
-    lines = [_named(link=link_words(status), **who, **felt)]
+    lines = [_named(link=link_words(status), **who, **feel)]
     for name, delay in (("to operator", facts.to_operator), ("to robot   ", facts.to_robot)):
         mean, p99, newest = (_figure(value, 5) for value in (delay.mean_ms, delay.p99_ms, delay.newest_ms))
         asked = delay.asked and f"  asked: {delay.asked}"

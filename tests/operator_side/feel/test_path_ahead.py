@@ -160,7 +160,7 @@ def haptics(compensation: Compensation = "operator") -> Haptics:
 
 
 def strengths(made: Haptics, update: StiffnessUpdate, now_s: float = 0.4) -> tuple[int, ...]:
-    made.take_map(update)
+    made.keep_map(update)
     report = made.due(update, (0.0, 0.8), Blindness(), now_s)
     effect = None if report is None else report.r2
     return (0,) * ZONE_COUNT if effect is None else effect
@@ -186,7 +186,7 @@ def test_a_path_is_traced_once_for_each_write_and_at_once_for_a_new_map() -> Non
     made = haptics()
     assert strengths(made, message(0.3, free)) == (0,) * ZONE_COUNT
     assert made.due(message(0.31, None), (0.0, 0.8), Blindness(), 0.405) is None
-    made.take_map(message(0.32, commanded))
+    made.keep_map(message(0.32, commanded))
     report = made.due(message(0.33, None), (0.0, 0.8), Blindness(), 0.406)
     assert report is not None
     assert report.r2 is not None
@@ -200,7 +200,7 @@ def test_what_is_to_be_touched_is_felt_beside_a_stick_in_the_zones_that_touch_it
     commanded = Around.of(FULL_S, np.stack([slow[0], fast, fast, fast]), CHANGES_S)
     made = haptics()
     update = message(0.3, commanded, r2=target)
-    made.take_map(update)
+    made.keep_map(update)
     report = made.due(update, (0.0, 0.1), Blindness(), 0.4)
     assert report is not None
     assert report.r2 is not None
