@@ -76,7 +76,7 @@ class RobotTurns:
     def turn(self, now_s: float) -> None:
         """Run one tick and queue its messages."""
         began = self._times.begin()
-        self._core.reports.felt.interval_s = self._sending.budget.haptic_interval_s
+        self._core.reports.deadband.interval_s = self._sending.budget.haptic_interval_s
         outgoing = self._core.tick(now_s)
         self._looking.ticked(self._times.end(began), self._process.loop.pacer.overruns)
         self._sending.push(outgoing, now_s)

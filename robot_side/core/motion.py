@@ -43,13 +43,13 @@ class Motion:
         pose: GripperPose,
         state: ArmState,
         grip: Grip,
-        felt: Sensed | None,
+        sensed: Sensed | None,
         now_s: float,
         homeward: FloatArray | str | None = None,
     ) -> None:
         """Command the arm; stop it if there is no permission.
 
-        felt: the law's result in the tick before. homeward: result of `Homing.follow`, instead of the command's motion.
+        sensed: the law's result in the tick before. homeward: result of `Homing.follow`, instead of the command.
         """
         command = permission.command
         if command is None or grip.touchdown.gives_way:
@@ -60,8 +60,8 @@ class Motion:
             self._arm.command(self._still, state.time_s)
             self._arm.command_gripper(0.0, now_s)
             return
-        if self._assists and felt is not None:
-            command = assisted(command, felt.l2, felt.r2)
+        if self._assists and sensed is not None:
+            command = assisted(command, sensed.l2, sensed.r2)
         if homeward is None:
             where = pose, state.joint_positions_rad, self._limits, self._settings
             motion = commanded(command, *where, stands=grip.touchdown.stands)

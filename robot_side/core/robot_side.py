@@ -111,11 +111,11 @@ class RobotSide:
         whole = grip.joined(pose)
         begin("motion")
         permission = self.session.permission(now_s)
-        felt = None if self.newest is None else self.newest[0]
+        before = None if self.newest is None else self.newest[0]
         homeward = None
-        if self.homing is not None and felt is not None:
-            homeward = self.homing.follow(permission.command, state, grip, objects, felt.enlargement_m)
-        self.motion.follow(permission, pose, state, grip, felt, now_s, homeward)
+        if self.homing is not None and before is not None:
+            homeward = self.homing.follow(permission.command, state, grip, objects, before.enlargement_m)
+        self.motion.follow(permission, pose, state, grip, before, now_s, homeward)
         begin("law")
         command = permission.command
         situation = Situation(

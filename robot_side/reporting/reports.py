@@ -38,7 +38,7 @@ class Reports:
     ) -> None:
         """around: `Law.around`. full_rate: send a stiffness message in every tick."""
         self.stiffness_sent = 0
-        self.felt = StiffnessDeadband(full_rate=full_rate)
+        self.deadband = StiffnessDeadband(full_rate=full_rate)
         """Deadband that decides when a stiffness message to the lease's owner leaves"""
         self._session, self._law_around, self._frames = session, around, frames
         self._around, self._seen = MapSchedule(around), TelemetryDeadband()
@@ -46,7 +46,7 @@ class Reports:
 
     def begin_epoch(self) -> None:
         """Begin with another owner of the lease, to which nothing has been sent yet."""
-        self.felt.forget()
+        self.deadband.forget()
         self._around = MapSchedule(self._law_around)
 
     def outgoing(
@@ -61,15 +61,15 @@ class Reports:
     ) -> list[Outgoing]:
         """Return the messages to operators that are due at `now_s`; see `stiffness_message`."""
         session = self._session
-        felt = sensed, commanded_m_s, permission.state, stands, hindered
+        content = sensed, commanded_m_s, permission.state, stands, hindered
         outgoing = [Outgoing("haptics", *answer) for answer in session.take_answers(now_s)]
-        if session.owner_peer is not None and self.felt.due(*felt, permission.command, now_s):
+        if session.owner_peer is not None and self.deadband.due(*content, permission.command, now_s):
             self.stiffness_sent += 1
             around = self._around.due(situation.pose, now_s)
-            outgoing += [stiffness_message(one, *felt, around) for one in session.owners(now_s)]
+            outgoing += [stiffness_message(one, *content, around) for one in session.owners(now_s)]
         if now_s >= self._next_observers_s:
             self._next_observers_s = now_s + OBSERVER_PERIOD_S
-            outgoing += [stiffness_message(one, *felt) for one in session.observers(now_s)]
+            outgoing += [stiffness_message(one, *content) for one in session.observers(now_s)]
         return outgoing
 
     def telemetry(

@@ -75,7 +75,7 @@ class Operator:
         return SessionState.UNKNOWN if self.notice is None else self.notice.session
 
     @property
-    def felt(self) -> list[StiffnessUpdate]:
+    def updates(self) -> list[StiffnessUpdate]:
         return [message for message in self.inbox if isinstance(message, StiffnessUpdate)]
 
     def take(self, message: StiffnessUpdate | Hello | LeaseNotice, now_s: float) -> None:

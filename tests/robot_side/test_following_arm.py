@@ -84,7 +84,7 @@ def test_it_is_said_by_name_within_half_a_second_and_counts_or_stops_the_arm(
     bench.drive(0.5, operator, r2=0.6)
     assert says in str(bench.robot.status(bench.now_s).hindrance)
     assert says in str(bench.views[-1].hindrance)
-    assert operator.felt[-1].hindered
+    assert operator.updates[-1].hindered
     assert bench.robot.newest is not None
     assert bench.robot.newest[1].astray_m_s > 0.02
     if spoil is servo_off:

@@ -44,7 +44,7 @@ class Placing(Bench):
 
     @property
     def stands(self) -> bool:
-        return self.owner.felt[-1].stands
+        return self.owner.updates[-1].stands
 
     @property
     def pressed_n(self) -> float:
@@ -63,7 +63,7 @@ def test_what_stands_is_pressed_no_farther_and_nothing_springs_when_it_is_let_go
     assert bench.pressed_n < most_n
     bench.go(0.5, r2=1.0)
     assert bench.pressed_n < most_n
-    assert bench.owner.felt[-1].commanded_m_s == pytest.approx(0.0, abs=1e-3)
+    assert bench.owner.updates[-1].commanded_m_s == pytest.approx(0.0, abs=1e-3)
     bench.go(0.5, gripper=-1.0)
     assert np.abs(bench.tool_m - where).max() < 1e-3
     assert (bench.robot.held, bench.stands) == (None, False)

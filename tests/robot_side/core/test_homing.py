@@ -48,7 +48,7 @@ def test_the_arm_goes_home_while_asked_to_and_stops_at_once_when_not(bench: Benc
     bench.drive(3.0, operator, home=1.0)
     assert off_rad(bench) < 5e-3
     assert bench.robot.motion.hindrance.text is None
-    assert operator.felt[-1].commanded_m_s == pytest.approx(0.0, abs=1e-3)
+    assert operator.updates[-1].commanded_m_s == pytest.approx(0.0, abs=1e-3)
 
 
 def test_a_lower_share_is_slower(bench: Bench) -> None:
@@ -104,12 +104,12 @@ def test_an_object_on_the_way_refuses_it_whatever_its_role_until_it_is_asked_for
     said = bench.robot.status(bench.now_s).hindrance
     assert said is not None
     assert said.startswith("no way home: object0 is ")
-    assert operator.felt[-1].hindered
+    assert operator.updates[-1].hindered
     camera.objects = ball_at(FAR_M)
     bench.drive(0.5, operator, home=1.0)
     assert off_rad(bench) == pytest.approx(begun_rad, abs=5e-3)
     bench.drive(0.1, operator)
-    assert not operator.felt[-1].hindered
+    assert not operator.updates[-1].hindered
     bench.drive(0.5, operator, home=1.0)
     assert off_rad(bench) < begun_rad - 0.05
 

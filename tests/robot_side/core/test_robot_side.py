@@ -107,23 +107,23 @@ def test_a_tick_knows_the_frame_that_was_taken_in_before_it_began(bench: Bench, 
 def test_what_the_law_finds_is_what_is_sent(bench: Bench, listening: Listening) -> None:
     operator = bench.join(2)
     bench.drive(0.3, operator)
-    felt, situation = operator.felt[-1], listening.heard[-1]
-    assert felt.r2.full_speed_m_s == pytest.approx(0.25, rel=0.01)
-    assert 0.5 < felt.r2.acceleration_m_s2 < 20.0
-    assert felt.horizon_m == pytest.approx(
-        felt.r2.full_speed_m_s * (situation.loop_age_s + 0.3)
-        + felt.r2.full_speed_m_s**2 / (2.0 * felt.r2.acceleration_m_s2)
+    update, situation = operator.updates[-1], listening.heard[-1]
+    assert update.r2.full_speed_m_s == pytest.approx(0.25, rel=0.01)
+    assert 0.5 < update.r2.acceleration_m_s2 < 20.0
+    assert update.horizon_m == pytest.approx(
+        update.r2.full_speed_m_s * (situation.loop_age_s + 0.3)
+        + update.r2.full_speed_m_s**2 / (2.0 * update.r2.acceleration_m_s2)
         + 0.05,
         rel=0.05,
     )
     # The table's target is some 20 cm ahead of the built-in arm's start, and nothing is behind it.
-    assert felt.r2.fast_m[7] < 1.0
-    assert felt.l2.fast_m[0] == felt.horizon_m
-    assert felt.rumble == 0.0
+    assert update.r2.fast_m[7] < 1.0
+    assert update.l2.fast_m[0] == update.horizon_m
+    assert update.rumble == 0.0
 
 
 def commanded_m_s(operator: Operator) -> float:
-    found = operator.felt[-1].commanded_m_s
+    found = operator.updates[-1].commanded_m_s
     assert found is not None
     return found
 
@@ -157,11 +157,11 @@ def test_an_operator_hears_that_a_joint_is_at_its_end(bench: Bench) -> None:
     bench.robot.motion._limits = replace(limits, lower_rad=ends)
     bench.drive(KEEP_ALIVE_S, operator, r2=0.4)
     assert commanded_m_s(operator) < 0.9 * free
-    assert operator.felt[-1].hindered
+    assert operator.updates[-1].hindered
     assert bench.robot.status(bench.now_s).hindrance == "joint 3 at its limit"
     bench.drive(KEEP_ALIVE_S, operator, l2=0.4)
     assert commanded_m_s(operator) == pytest.approx(-free, rel=0.01)
-    assert not operator.felt[-1].hindered
+    assert not operator.updates[-1].hindered
 
 
 def test_full_speed_is_reckoned_with_until_the_operator_has_echoed(bench: Bench, listening: Listening) -> None:
@@ -171,13 +171,13 @@ def test_full_speed_is_reckoned_with_until_the_operator_has_echoed(bench: Bench,
     assert not listening.heard[-1].loop_age_known
     bench.join(2)
     bench.drive(0.1, bench.operators[b"operator"])
-    felt = bench.operators[b"operator"].felt
-    assert felt[0].r2.displacement_m == pytest.approx(felt[0].r2.full_speed_m_s, rel=0.05)
+    updates = bench.operators[b"operator"].updates
+    assert updates[0].r2.displacement_m == pytest.approx(updates[0].r2.full_speed_m_s, rel=0.05)
     assert listening.heard[-1].loop_age_known
     # The assumed loop age falls slowly from the initial one, which is the worst case.
     assert 0.1 < listening.heard[-1].loop_age_s < 0.9
-    assert abs(felt[-1].r2.displacement_m) < 0.01
-    assert operator.felt == []
+    assert abs(updates[-1].r2.displacement_m) < 0.01
+    assert operator.updates == []
 
 
 def test_the_law_knows_the_gap_between_the_fingers_and_what_they_hold(bench: Bench, listening: Listening) -> None:

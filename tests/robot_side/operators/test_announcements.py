@@ -35,9 +35,9 @@ def test_observers_feel_at_a_reduced_rate_and_see_the_robots_state(bench: Bench)
     owner.inbox.clear()
     observer.inbox.clear()
     bench.drive(0.5, owner)
-    assert len(owner.felt) == pytest.approx(0.5 / KEEP_ALIVE_S, abs=1)  # Nothing changes.
-    assert len(observer.felt) == pytest.approx(0.5 / OBSERVER_PERIOD_S, abs=1)
-    assert observer.felt[-1].state == "armed"
+    assert len(owner.updates) == pytest.approx(0.5 / KEEP_ALIVE_S, abs=1)  # Nothing changes.
+    assert len(observer.updates) == pytest.approx(0.5 / OBSERVER_PERIOD_S, abs=1)
+    assert observer.updates[-1].state == "armed"
 
 
 def to_owner(bench: Bench, ticks: int) -> list[tuple[float, bool, AnyMessage]]:

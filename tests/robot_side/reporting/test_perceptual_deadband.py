@@ -57,14 +57,14 @@ class Run:
         header = Header(1, 1 + round(1e3 * self.now_s), self.now_s)
         command = MotionCommand(header, max(0.0, -travel), max(0.0, travel), run=True, compensation=compensation)
         now = how.get("now") or sensed(self.left_m, self.speed_m_s)
-        felt = (
+        content = (
             now,
             how.get("made_of_it_m_s", commanded_m_s),
             state,
             how.get("stands", False),
             how.get("hindered", False),
         )
-        due = self.deadband.due(*felt, command, self.now_s)
+        due = self.deadband.due(*content, command, self.now_s)
         if due:
             self.sent_s.append(self.now_s)
             self.believed_m, self.moved_m, self.believed_m_s = self.left_m, 0.0, self.speed_m_s
