@@ -16,7 +16,6 @@ from scipy.stats import bootstrap
 
 from common.arrays import FloatArray
 from common.reaction import REACTION_S
-from feelahead.lab.approaches.felt_by import Draw, Judged
 from feelahead.lab.approaches.frozen import PASSED, SITE, frozen_scene
 from feelahead.lab.approaches.judging import false_alarms, strength_before_release
 from feelahead.lab.approaches.laws import Law
@@ -24,6 +23,7 @@ from feelahead.lab.approaches.placements import Collision, first_touch_s, place
 from feelahead.lab.approaches.pulls import PullKind
 from feelahead.lab.approaches.recording import record_approach
 from feelahead.lab.approaches.replay import Replay
+from feelahead.lab.approaches.strengths import Draw, Judged
 from feelahead.lab.table import Row
 from operator_side.controller.feel import MAX_STRENGTH
 from robot_side.drivers.mujoco.camera import CameraError

@@ -9,9 +9,9 @@ from scipy.special import ndtri
 
 from common.arrays import FloatArray
 from common.reaction import REACTION_S
-from feelahead.lab.approaches.felt_by import Draw, Judged
 from feelahead.lab.approaches.placements import shifted
 from feelahead.lab.approaches.stopping_path import stopping_path
+from feelahead.lab.approaches.strengths import Draw, Judged
 from operator_side.controller.feel import SENSED_TRAVEL, ZONE_COUNT
 from operator_side.dualsense.simulated.trigger_model import zone_of
 from operator_side.hands.travel_calibration import TriggerTravel
@@ -35,7 +35,7 @@ def strength_before_release(law: Judged, draw: Draw, last_release_s: float) -> i
     at_s = last_release_s - REACTION_S
     record = draw.replay.record
     reached = record.travel[record.tick_row(at_s) : record.tick_row(last_release_s) + 1, _R2].max()
-    return int(law.felt(draw, np.array([at_s]))[0, _R2, zone_of(float(reached))])
+    return int(law.strengths(draw, np.array([at_s]))[0, _R2, zone_of(float(reached))])
 
 
 def zone_speed_m_s(zone: int) -> float:
@@ -67,7 +67,7 @@ def false_alarms(law: Judged, draw: Draw, posed: PosedScene, shift_m: FloatArray
     pulled = travels > SENSED_TRAVEL * _TRAVEL.dead_zone
     if not pulled.any():
         return Alarms(0, 0.0, 0.0)
-    strengths = law.felt(draw, times)[:, _R2]
+    strengths = law.strengths(draw, times)[:, _R2]
     alarmed = np.zeros(len(times), dtype=np.bool_)
     for number in np.flatnonzero(pulled):
         zone = zone_of(float(travels[number]))

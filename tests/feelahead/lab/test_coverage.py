@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 
 from feelahead.lab.approaches.approach import Approach, PullRun
 from feelahead.lab.approaches.evaluation import LINKS, Placement, Pulls, draws_needed, evaluate, interval
-from feelahead.lab.approaches.felt_by import Draw, Judged
 from feelahead.lab.approaches.frozen import SITE, frozen_scene
 from feelahead.lab.approaches.judging import (
     false_alarms,
@@ -22,6 +21,7 @@ from feelahead.lab.approaches.placements import first_touch_s, last_release_s
 from feelahead.lab.approaches.pulls import PullKind, make_pull
 from feelahead.lab.approaches.recording import RecordedApproach, record_approach
 from feelahead.lab.approaches.replay import Replay, coasting_s
+from feelahead.lab.approaches.strengths import Draw, Judged
 from feelahead.lab.questions.coverage import QUESTION
 from feelahead.lab.sweep import ask
 from feelahead.lab.table import Row
@@ -153,9 +153,9 @@ def test_over_a_whole_pull_it_is_what_both_sides_show_live(law: Law) -> None:
     _, camera_seed = np.random.SeedSequence(SEED).generate_state(2)
     names = tuple(thing.name for thing in posed.scene.objects)
     draw = Draw(replay, posed.perceived(CameraError(names, 0.0, 0.003, 0.0, int(camera_seed)).next_frame()), 0.003)
-    felt = Judged(law, 0.99).felt(draw, began_s + trace.time_s)[:, 1]
+    strengths = Judged(law, 0.99).strengths(draw, began_s + trace.time_s)[:, 1]
     # Its poses are 10 ms apart and its encoders draw other errors, so it may be off for a moment.
-    differs = felt - trace.strengths
+    differs = strengths - trace.strengths
     assert np.count_nonzero(differs) < 0.04 * differs.size
     assert abs(differs.mean()) < 0.05
     assert trace.strengths.max() > 0
@@ -198,8 +198,8 @@ def test_a_cell_has_what_it_takes_to_judge_it() -> None:
 
 
 def test_strengths_on_the_other_trigger_show(monkeypatch: pytest.MonkeyPatch) -> None:
-    felt = Judged.felt
-    monkeypatch.setattr(Judged, "felt", lambda *asked: felt(*asked)[:, ::-1])
+    strengths = Judged.strengths
+    monkeypatch.setattr(Judged, "strengths", lambda *asked: strengths(*asked)[:, ::-1])
     assert [row["coverage"] for row in judged(("swept",), "wall")] == [0.0]
 
 

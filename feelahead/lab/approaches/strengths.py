@@ -77,7 +77,7 @@ class Judged:
     law: Law
     probability: float
 
-    def felt(self, draw: Draw, times_s: FloatArray) -> IntArray:
+    def strengths(self, draw: Draw, times_s: FloatArray) -> IntArray:
         """Return the strengths (t, 2, 10), 0 to 8, of L2's and R2's zones at the operator side's rising times (t,)."""
         always = MAX_STRENGTH if self.law == "full" else 0
         strengths = np.full((len(times_s), 2, ZONE_COUNT), always, dtype=np.int64)
@@ -86,8 +86,8 @@ class Judged:
         record = draw.replay.record
         law, rendering = self._law(draw), TriggerRendering(RenderingSettings(), TravelCalibration())
         mapped_s = -math.inf
-        for number, felt_s in enumerate(times_s.tolist()):
-            tick = record.tick_row(felt_s)
+        for number, shown_s in enumerate(times_s.tolist()):
+            tick = record.tick_row(shown_s)
             sent_s = record.seen_sent_s[tick]
             if np.isnan(sent_s) or sent_s < record.pose_time_s[0]:
                 continue
@@ -99,8 +99,8 @@ class Judged:
             sensed = law.sense(self._situation(draw, row), float(record.pose_time_s[row]))
             pulled = [_TRAVEL.travel(min(travel / SENSED_TRAVEL, 1.0)) for travel in record.travel[tick]]
             message = _message(sensed, row)
-            known, aside = self._under_way(draw.replay, law, sensed, row, felt_s)
-            shown = rendering.render(message, (pulled[0], pulled[1]), known, felt_s, aside)
+            known, aside = self._under_way(draw.replay, law, sensed, row, shown_s)
+            shown = rendering.render(message, (pulled[0], pulled[1]), known, shown_s, aside)
             for trigger, zones in enumerate((shown.l2, shown.r2)):
                 strengths[number, trigger] = zones or 0
         return strengths
