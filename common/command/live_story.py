@@ -41,7 +41,7 @@ class _State(NamedTuple):
     reason: str | None = None
     linked: bool = False
     armed: bool = False
-    felt: tuple[Resistance, ...] = (Resistance.NONE, Resistance.NONE)
+    resistances: tuple[Resistance, ...] = (Resistance.NONE, Resistance.NONE)
     """Resistance of L2 and of R2"""
     touched: str | None = None
     holding: str | None = None
@@ -72,8 +72,8 @@ class Story:
             return None
         self._reported, self._reported_s = state, now_s
         news = "; ".join(_news(reported, state, view, self._peaks))
-        for trigger, felt in zip(view.triggers, state.felt, strict=True):
-            if felt is Resistance.NONE:
+        for trigger, resistance in zip(view.triggers, state.resistances, strict=True):
+            if resistance is Resistance.NONE:
                 self._peaks[trigger.name] = 0.0
         return f"{now_s - self._start_s:6.1f} s  {news}{_figures(view)}"
 
@@ -84,10 +84,12 @@ def _next_state(before: _State, view: LiveView) -> _State:
         touched = None
     elif nearest_mm <= 0.0 and touched is None and view.robot.nearest is not None:
         touched = printable(view.robot.nearest)
-    felt = (next_resistance(was, one.resists or 0.0) for was, one in zip(before.felt, view.triggers, strict=True))
+    resistances = (
+        next_resistance(was, one.resists or 0.0) for was, one in zip(before.resistances, view.triggers, strict=True)
+    )
     linked = view.side.link is LinkState.UP
     seen = touched, view.holding, view.stands, view.hindrance
-    return _State(view.phase, view.reason, linked, view.armed, tuple(felt), *seen)
+    return _State(view.phase, view.reason, linked, view.armed, tuple(resistances), *seen)
 
 
 def _news(reported: _State, state: _State, view: LiveView, peaks: Mapping[str, float]) -> list[str]:
@@ -98,7 +100,7 @@ def _news(reported: _State, state: _State, view: LiveView, peaks: Mapping[str, f
         news.append("armed")
     if state[:2] != reported[:2]:
         news.append(state.phase if state.reason is None else f"{state.phase}: {state.reason}")
-    for trigger, before, after in zip(view.triggers, reported.felt, state.felt, strict=True):
+    for trigger, before, after in zip(view.triggers, reported.resistances, state.resistances, strict=True):
         if after is not before:
             news.append(_resistance(trigger, before, after, peaks[trigger.name], view.operator.haptics))
     if state.touched != reported.touched:
