@@ -10,7 +10,7 @@ import numpy as np
 from common.arrays import FloatArray, IntArray
 from common.protocol.around import PERIOD_S
 from common.protocol.messages import Header, StiffnessUpdate
-from feelahead.lab.approaches.laws import Law, compensation_of, law_of_robot
+from feelahead.lab.approaches.laws import ComparedLaw, compensation_of, law_of_robot
 from feelahead.lab.approaches.replay import Replay
 from operator_side.controller.feel import MAX_STRENGTH, SENSED_TRAVEL, ZONE_COUNT
 from operator_side.feel.commands_under_way import Displacement, Report
@@ -20,7 +20,7 @@ from operator_side.hands.travel_calibration import TravelCalibration, TriggerTra
 from robot_side.drivers.mujoco.joint_reference import MotionLimits
 from robot_side.enlargement.distance import Uncertainty
 from robot_side.enlargement.prediction_errors import BUILT_IN, PredictionErrors, load_prediction_errors
-from robot_side.laws.law import Law as RobotLaw
+from robot_side.laws.law import Law
 from robot_side.laws.paper import PaperLaw
 from robot_side.laws.swept import SweptLaw
 from robot_side.surroundings.perceived import PerceivedObjects
@@ -74,7 +74,7 @@ class Judged:
     rendered between the given times, so a strength falls by several steps at once from one time to the next.
     """
 
-    law: Law
+    law: ComparedLaw
     probability: float
 
     def strengths(self, draw: Draw, times_s: FloatArray) -> IntArray:
@@ -105,7 +105,7 @@ class Judged:
                 strengths[number, trigger] = zones or 0
         return strengths
 
-    def _law(self, draw: Draw) -> RobotLaw:
+    def _law(self, draw: Draw) -> Law:
         replay = draw.replay
         uncertainty = Uncertainty(self.probability, camera_sd_m=draw.camera_sd_m, prediction=_prediction_errors())
         arguments = uncertainty, replay.encoder_sigma_rad, MotionLimits().of_joints(replay.joints), replay.motion
@@ -129,7 +129,7 @@ class Judged:
         )
 
     def _under_way(
-        self, replay: Replay, law: RobotLaw, sensed: Sensed, row: int, now_s: float
+        self, replay: Replay, law: Law, sensed: Sensed, row: int, now_s: float
     ) -> tuple[Displacement | None, CourseOnMap | None]:
         """Predict the motion by trigger and sticks after the pose in `row`; None if the robot side compensates."""
         if compensation_of(self.law) == "robot":
