@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from common.protocol.link_end import LinkEnd
 from common.protocol.messages import AnyMessage, Header, MotionCommand
 from tests.helpers.clock_exchanges import ahead
-from tests.helpers.felt import felt
+from tests.helpers.messages import uniform_update
 
 CLOCK = "one clock"
 
@@ -35,7 +35,7 @@ def test_the_loop_age_spans_both_ways_and_the_holding() -> None:
     robot, operator = ends()
     robot.arrived(operator.hello(0.0), 0.0)
     operator.arrived(robot.hello(0.0), 0.0)
-    operator.arrived(felt(robot.stamp(1.0)), 1.05)  # 50 ms to the operator
+    operator.arrived(uniform_update(robot.stamp(1.0)), 1.05)  # 50 ms to the operator
     command = motion(operator.stamp(1.08))  # Held for 30 ms, of which 16 need no message.
     arrival = robot.arrived(command, 1.10)  # 20 ms to the robot
     assert arrival.loop_age_s == pytest.approx(0.084)
@@ -140,7 +140,7 @@ def test_delays_count_once_the_offset_has_settled() -> None:
     for k in range(60):
         sent_s = 0.1 + 0.05 * k
         arrival = robot.arrived(motion(operator.stamp(sent_s)), 500.02 + sent_s)
-        operator.arrived(felt(robot.stamp(500.02 + sent_s)), sent_s + 0.04)
+        operator.arrived(uniform_update(robot.stamp(500.02 + sent_s)), sent_s + 0.04)
         assert arrival.one_way_s is not None
     assert robot.delay.count == 39
     assert robot.delay.mean == pytest.approx(0.02, abs=20e-6)
@@ -172,7 +172,7 @@ def test_a_peer_that_slept_is_followed_and_its_messages_are_not_old_for_ever(sle
         ahead_s = 500.0 if k < 500 else 500.0 + slept_s
         true_s = 0.1 + 0.05 * k + (0.0 if k < 500 else slept_s)
         arrival = robot.arrived(motion(operator.stamp(true_s + 500.0 - ahead_s)), true_s + 500.02)
-        operator.arrived(felt(robot.stamp(true_s + 500.02)), true_s + 500.04 - ahead_s)
+        operator.arrived(uniform_update(robot.stamp(true_s + 500.02)), true_s + 500.04 - ahead_s)
         ages_s.append(arrival.queueing_age_s)
     assert robot.clock_offset.jumps == 1
     assert ages_s[500] == pytest.approx(slept_s, abs=1e-6)
@@ -202,7 +202,7 @@ def test_a_peer_that_invents_stamps_spoils_nothing_for_long(
         for _ in range(40):
             now_s += 0.05
             arrival = robot.arrived(motion(operator.stamp(now_s)), ahead_s + now_s + 0.02)
-            operator.arrived(felt(robot.stamp(ahead_s + now_s + 0.02)), now_s + 0.04)
+            operator.arrived(uniform_update(robot.stamp(ahead_s + now_s + 0.02)), now_s + 0.04)
         assert arrival.one_way_s is not None
         assert 0.0 <= arrival.one_way_s < 0.1
         bound_s, offset_s = robot.clock_offset.bound_s, robot.clock_offset.offset_s
@@ -215,13 +215,13 @@ def test_an_overtaken_message_is_echoed_beside_the_newest() -> None:
     robot, operator = ends()
     operator.arrived(robot.hello(0.0), 0.0)
     older, newer = robot.stamp(1.0), robot.stamp(1.1)
-    operator.arrived(felt(newer), 1.15)
+    operator.arrived(uniform_update(newer), 1.15)
     assert operator.stamp(1.155).last_sent_s is None
-    operator.arrived(felt(older), 1.16)
+    operator.arrived(uniform_update(older), 1.16)
     echo = operator.stamp(1.2)
     assert (echo.echo_sent_s, echo.last_sent_s) == (1.1, 1.0)
     assert echo.last_held_s == pytest.approx(0.04)
-    operator.arrived(felt(robot.stamp(1.2)), 1.25)
+    operator.arrived(uniform_update(robot.stamp(1.2)), 1.25)
     assert operator.stamp(1.26).last_sent_s is None
 
 

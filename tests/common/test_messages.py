@@ -37,7 +37,7 @@ from common.protocol.messages import (
 from common.protocol.session import SessionState
 from common.protocol.uniform_field import FAR_M, STRENGTHS, uniform_field
 from common.protocol.view_messages import AnyViewMessage, SceneShapes, Shape, VideoFrame, VideoStep
-from tests.helpers.felt import felt, field, onsets, scene_state
+from tests.helpers.messages import field, onsets, scene_state, uniform_update
 
 HEADER = Header(epoch=1, sequence=2, sent_s=3.0)
 FULL = Header(2**53 - 1, 10_000_000, 1e6 / 3.0, 1e5 / 3.0, 0.02 / 3.0, 1e5 / 7.0, 0.01 / 3.0)
@@ -54,7 +54,7 @@ VIEWS: tuple[AnyViewMessage, ...] = (
 VALID: tuple[AnyMessage, ...] = (
     Hello(HEADER, side="operator", clock_domain="boot"),
     MotionCommand(HEADER, l2=0.5, r2=0.25, lateral=(0.1, -0.1), run=True),
-    felt(HEADER, l2=0, r2=5, rumble=0.5),
+    uniform_update(HEADER, l2=0, r2=5, rumble=0.5),
 )
 
 
@@ -220,7 +220,7 @@ EVERYDAY: tuple[AnyMessage, ...] = (
     control.LinkReport(
         FULL, 123456.7, 1234.5, 0.123, "30 Hz, quality 75, size 0.5", "pictures 12 (rate), scene 3 (queue)"
     ),
-    felt(FULL, l2=8, r2=5, rumble=0.5),
+    uniform_update(FULL, l2=8, r2=5, rumble=0.5),
     Telemetry(
         FULL,
         "armed",
@@ -244,7 +244,7 @@ def test_every_message_for_hands_and_fingers_is_at_most_200_bytes(message: AnyMe
 
 
 def test_a_map_of_six_joints_adds_149_bytes() -> None:
-    plain, told = felt(FULL, l2=8, r2=5), Around(0.8, bytes(LISTS * PROBES), bytes(2 * 6 * AXES))
+    plain, told = uniform_update(FULL, l2=8, r2=5), Around(0.8, bytes(LISTS * PROBES), bytes(2 * 6 * AXES))
     mapped = msgspec.structs.replace(plain, around=told)
     assert len(encode(mapped)) - len(encode(plain)) == 149
 

@@ -12,7 +12,7 @@ from common.sockets.authentication import RobotKeys
 from common.sockets.robot import RobotSockets
 from robot_side.operators.operator_session import OperatorSession
 from robot_side.operators.safety import Safety, SafetySettings
-from tests.helpers.felt import telemetry
+from tests.helpers.messages import telemetry
 
 LEASE_S = 59.0
 """Duration of a lease in seconds, so long that a silent owner keeps the lease"""

@@ -16,7 +16,7 @@ from operator_side.dualsense.simulated.trigger_model import SPRING_PRELOAD_N, SP
 from operator_side.hands.travel_calibration import TravelCalibration
 from operator_side.people.person import SimulatedOperator
 from operator_side.people.settings import PersonSettings
-from tests.helpers.felt import telemetry
+from tests.helpers.messages import telemetry
 
 TICK_S, FRAME_S = 0.004, 0.02
 CALIBRATION = TravelCalibration()

@@ -10,7 +10,7 @@ from operator_side.controller.state import Button, ControllerState
 from operator_side.core import OperatorSide
 from operator_side.core_settings import CoreSettings
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
-from tests.helpers.felt import felt
+from tests.helpers.messages import uniform_update
 
 
 class Bench:
@@ -29,7 +29,7 @@ class Bench:
         self.side.receive(encode(notice), self.now_s)
 
     def stiffness(self, r2: int, state: MotionState = "armed", rumble: float = 0.0) -> bytes:
-        return encode(felt(self.robot.stamp(self.now_s), r2=r2, rumble=rumble, state=state))
+        return encode(uniform_update(self.robot.stamp(self.now_s), r2=r2, rumble=rumble, state=state))
 
     def feel(self, r2: int, state: MotionState = "armed", rumble: float = 0.0) -> None:
         """Let the operator side receive a field with the same strengths in all zones."""

@@ -11,8 +11,8 @@ from common.protocol.codec import encode
 from common.protocol.messages import MotionState
 from operator_side.controller.feel import FREE_TRIGGER, RELEASED, Feel
 from operator_side.dualsense.reports.output_report import parse_output_report
-from tests.helpers.felt import felt
 from tests.helpers.machines.waiting import LIMIT_S, wait_until
+from tests.helpers.messages import uniform_update
 from tests.helpers.python_process import start
 from tests.helpers.serving_robot import ServingRobot
 
@@ -31,7 +31,7 @@ class StiffnessSource(ServingRobot):
     def tick(self, now_s: float) -> None:
         self.session.update(now_s)
         for owner in () if self.silent else self.session.owners(now_s):
-            self.sockets.send(owner.peer, encode(felt(owner.header, r2=7, state=self.state)))
+            self.sockets.send(owner.peer, encode(uniform_update(owner.header, r2=7, state=self.state)))
 
 
 class World:

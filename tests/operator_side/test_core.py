@@ -15,7 +15,7 @@ from operator_side.controller.feel import USUAL_LIGHT, WARNING_LIGHT
 from operator_side.controller.state import Button
 from operator_side.core import OperatorSide
 from operator_side.hands.travel_calibration import TravelCalibration, TriggerTravel
-from tests.helpers.felt import felt, field, onsets, telemetry
+from tests.helpers.messages import field, onsets, telemetry, uniform_update
 from tests.operator_side.operator_bench import Bench
 
 
@@ -262,7 +262,7 @@ def test_commands_that_end_mean_stop_and_an_observer_knows_none(
         bench.notice(session)
         assert bench.commands() == []
     header = Header(1, 100, bench.now_s, echo_sent_s=echo_s, echo_held_s=0.0)
-    bench.feel_field(msgspec.structs.replace(felt(header), r2=field(onsets(0.1)), horizon_m=1.0))
+    bench.feel_field(msgspec.structs.replace(uniform_update(header), r2=field(onsets(0.1)), horizon_m=1.0))
     assert bench.side.summary()["rendering"]["without_history"] == unknown
     # The last command counts until the end of commands is noted, 0.2 s later: δ = 0.25 * 0.296 = 74 mm, w = 0.
     assert unknown or bench.device.strengths[1] == (0,) * 3 + (8,) * 7

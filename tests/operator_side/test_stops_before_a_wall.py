@@ -20,7 +20,7 @@ from operator_side.controller.state import Button
 from operator_side.core import OperatorSide
 from operator_side.core_settings import CoreSettings
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
-from tests.helpers.felt import field, onsets
+from tests.helpers.messages import field, onsets
 
 STEP_S = 0.002
 FULL_M_S, ACCELERATION_M_S2 = 0.25, 3.0

@@ -17,7 +17,7 @@ from common.recording.entries import Entry, Kind, entry, pack_block, split_text,
 from common.recording.mcap_file import RecordingFile
 from common.recording.reading import open_recording
 from common.recording.wire import BLOCK, FORMAT, HEADER, NOTE, STATUS, VIEW, as_json, stamped
-from tests.helpers.felt import scene_state
+from tests.helpers.messages import scene_state
 
 SECONDS = 5
 BLOCKS_A_SECOND = 20

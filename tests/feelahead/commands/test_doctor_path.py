@@ -12,8 +12,8 @@ from common.sockets.tcp_figures import TcpFigures
 from feelahead.commands.doctor import path
 from feelahead.commands.doctor.path import judged, path_line
 from feelahead.main import command
-from tests.helpers.felt import felt
 from tests.helpers.machines.waiting import wait_until
+from tests.helpers.messages import uniform_update
 from tests.helpers.serving_robot import ServingRobot
 
 VIEW: dict[str, Any] = {"rate_hz": 12.0, "age_p95_ms": 240.0}
@@ -57,7 +57,7 @@ class _Filming(ServingRobot):
 
     def tick(self, now_s: float) -> None:
         for one in [*self.session.owners(now_s), *self.session.observers(now_s)]:
-            self.sockets.send(one.peer, encode(felt(one.header, state="disarmed")))
+            self.sockets.send(one.peer, encode(uniform_update(one.header, state="disarmed")))
         if "overview" in self.session.watchers.looked_at(now_s):
             header = self.session.shown_header(now_s)
             frame = VideoFrame(header, "overview", captured_s=now_s - 0.05, width=4, height=4, jpeg=b"picture")

@@ -13,7 +13,7 @@ from operator_side.dualsense.reports.input_report import parse_input_report
 from operator_side.dualsense.reports.output_report import build_output_report
 from operator_side.dualsense.reports.transport import Transport
 from tests.helpers.fake_kernel import START, STOP, FakeKernel, get_report, output, said
-from tests.helpers.felt import feedback
+from tests.helpers.messages import feedback
 
 INPUT2, GET_REPORT_REPLY, DESTROY = 12, 10, 1
 

@@ -3,7 +3,7 @@
 from common.protocol.codec import encode
 from common.protocol.uniform_field import STRENGTHS
 from robot_side.operators.safety import SafetySettings
-from tests.helpers.felt import felt
+from tests.helpers.messages import uniform_update
 from tests.helpers.serving_robot import ServingRobot
 
 SLOW_MACHINE = SafetySettings(gap_s=3.0, age_s=10.0, max_delay_s=20.0, healthy_s=0.3, lease_s=30.0)
@@ -43,5 +43,5 @@ class ArmlessRobot(ServingRobot):
             return
         [owner] = owners
         self._next_s = now_s + _FIELD_PERIOD_S
-        stiffness = felt(owner.header, r2=round(STRENGTHS * self.r2_stiffness), state=permission.state)
+        stiffness = uniform_update(owner.header, r2=round(STRENGTHS * self.r2_stiffness), state=permission.state)
         self.sockets.send(owner.peer, encode(stiffness), everywhere=owner.everywhere)

@@ -11,8 +11,8 @@ from operator_side.dualsense.reports.output_report import build_output_report
 from operator_side.dualsense.reports.transport import Transport
 from operator_side.dualsense.simulated.controller import SIMULATED_ADDRESS
 from operator_side.dualsense.uhid.controller import UhidIdentity
-from tests.helpers.felt import feedback
 from tests.helpers.machines.waiting import LIMIT_S, wait_until
+from tests.helpers.messages import feedback
 from tests.kernel.inside.kernel_view import ABS_RZ, ABS_X, InputDevice, seen_device
 
 # Not all of `feelahead`: an emulated processor would take long to load the other commands.

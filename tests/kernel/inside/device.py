@@ -14,8 +14,8 @@ from operator_side.dualsense.hid.device import HidDualSense, load_backend
 from operator_side.dualsense.hid.finding import find_controller, sightings
 from operator_side.dualsense.simulated.controller import SIMULATED_FIRMWARE
 from operator_side.dualsense.simulated.trigger_model import NORMAL_FINGER_FORCE_N
-from tests.helpers.felt import feedback
 from tests.helpers.machines.waiting import wait_until
+from tests.helpers.messages import feedback
 from tests.kernel.inside.driver import bound
 from tests.kernel.inside.plugged import ADDRESS, Plugged
 

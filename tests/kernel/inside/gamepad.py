@@ -15,8 +15,8 @@ from operator_side.controller.state import Button, ControllerState
 from operator_side.dualsense.reports.transport import Transport
 from operator_side.dualsense.simulated.trigger_model import NORMAL_FINGER_FORCE_N
 from operator_side.evdev.pad import find_pad
-from tests.helpers.felt import feedback
 from tests.helpers.machines.waiting import wait_until
+from tests.helpers.messages import feedback
 from tests.kernel.inside.armless_robot import ArmlessRobot
 from tests.kernel.inside.driver import bound
 from tests.kernel.inside.operator_side import Desk, arm_and_move

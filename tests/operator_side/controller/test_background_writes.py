@@ -8,8 +8,8 @@ from common.errors import DeviceError
 from operator_side.controller.background_writes import CLOSE_TIMEOUT_S, STALL_S, BackgroundWrites
 from operator_side.controller.feel import FREE_TRIGGER, RELEASED, Feel, Rumble
 from operator_side.controller.state import ControllerState
-from tests.helpers.felt import feedback
 from tests.helpers.machines.waiting import LIMIT_S
+from tests.helpers.messages import feedback
 
 STIFF = Feel(r2=feedback(3, 6))
 

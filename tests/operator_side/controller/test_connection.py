@@ -10,7 +10,7 @@ from operator_side.controller.port import OpenController
 from operator_side.controller.search import BackgroundSearch
 from operator_side.controller.silence import SILENT_S
 from operator_side.controller.state import ControllerState
-from tests.helpers.felt import feedback
+from tests.helpers.messages import feedback
 
 PERIOD_S = 0.004
 STIFF = Feel(r2=feedback(3, 6))

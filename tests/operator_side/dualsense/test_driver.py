@@ -23,7 +23,7 @@ from tests.helpers.fake_hid import (
     FakeHandle,
     valid_checksum,
 )
-from tests.helpers.felt import feedback
+from tests.helpers.messages import feedback
 
 PATH = b"/dev/hidraw3"
 TRANSPORTS = pytest.mark.parametrize("transport", [USB, BLUETOOTH])

@@ -18,7 +18,7 @@ from operator_side.dualsense.reports.output_report import (
     transport_of_output,
 )
 from operator_side.dualsense.reports.transport import Seed, Transport, sealed
-from tests.helpers.felt import feedback
+from tests.helpers.messages import feedback
 
 TRANSPORTS = pytest.mark.parametrize("transport", Transport)
 STRENGTHS = st.tuples(*[st.integers(0, 8)] * 10)

@@ -19,7 +19,7 @@ from operator_side.dualsense.hid.release_watchdog import SILENCE_S
 from operator_side.dualsense.reports.transport import Transport
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.hands.newest import INTENT_EXPIRES_S
-from tests.helpers.felt import felt
+from tests.helpers.messages import uniform_update
 from tests.operator_side.dualsense.simulated_system import (
     PERIOD_S,
     SimulatedSystem,
@@ -77,7 +77,9 @@ class Plugs(RuleBasedStateMachine):
         self.armed = self.armed and now_s - self.commanded_s < 0.1
         session = SessionState.ARMED if self.armed else SessionState.DISARMED
         notice = LeaseNotice(self.robot.stamp(now_s), session=session, why="", token=7, waiting=0)
-        commanded = felt(self.robot.stamp(now_s), r2=self.strength, state="armed" if self.armed else "disarmed")
+        commanded = uniform_update(
+            self.robot.stamp(now_s), r2=self.strength, state="armed" if self.armed else "disarmed"
+        )
         for message in (notice, commanded):
             self.core.receive(encode(message), now_s)
         self.must_stop = self.must_stop and self.armed

@@ -17,7 +17,7 @@ from operator_side.dualsense.simulated.trigger_model import (
     SimulatedTrigger,
     equilibrium_travel,
 )
-from tests.helpers.felt import feedback
+from tests.helpers.messages import feedback
 
 TRANSPORTS = pytest.mark.parametrize("transport", Transport)
 STRENGTHS = st.tuples(*[st.integers(0, 8)] * 10)

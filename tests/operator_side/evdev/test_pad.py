@@ -9,7 +9,7 @@ from common.errors import DeviceError
 from operator_side.controller.feel import FREE_TRIGGER, RELEASED, WARNING_LIGHT, Feel, Rumble
 from operator_side.controller.state import Button
 from operator_side.evdev.pad import BUTTONS, LENGTH_S, EvdevPad
-from tests.helpers.felt import feedback
+from tests.helpers.messages import feedback
 from tests.operator_side.evdev.fake_node import ABS, DROPPED, KEY, REPORT, FakeNode, state_of
 
 L1, R2_AXIS = 0x136, 5

@@ -16,7 +16,7 @@ from operator_side.feel.commands_under_way import MAX_DELAY_S, CommandsUnderWay,
 from operator_side.feel.haptics import Haptics
 from operator_side.feel.rendering import RenderingSettings
 from operator_side.hands.travel_calibration import TravelCalibration
-from tests.helpers.felt import felt
+from tests.helpers.messages import uniform_update
 
 FULL_M_S = 0.25
 PERIOD_S = 0.004
@@ -199,6 +199,6 @@ def test_on_the_way_home_the_robot_sides_reckoning_holds_until_the_last_such_com
     for echo in (0, 1, 2):
         before = haptics.without_history
         header = Header(1, 1, 0.4, echo_sent_s=0.1 * echo, echo_held_s=0.0)
-        haptics.due(felt(header), (0.0, 0.0), Blindness(), 0.4)
+        haptics.due(uniform_update(header), (0.0, 0.0), Blindness(), 0.4)
         known.append(haptics.without_history == before)
     assert known == expected

@@ -20,7 +20,7 @@ from operator_side.feel.path_ahead import CourseOnMap, _ahead, contact_distances
 from operator_side.feel.rendering import RenderingSettings
 from operator_side.feel.zones import zone_travels
 from operator_side.hands.travel_calibration import TravelCalibration, TriggerTravel
-from tests.helpers.felt import onsets
+from tests.helpers.messages import onsets
 
 FULL_S = 0.8
 FIELD = uniform_field(0)

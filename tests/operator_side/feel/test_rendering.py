@@ -8,7 +8,7 @@ from operator_side.controller.feel import FREE_TRIGGER, RELEASED, Feel, Rumble
 from operator_side.feel.commands_under_way import Displacement
 from operator_side.feel.rendering import RenderedTrigger, RenderingSettings, TriggerRendering
 from operator_side.hands.travel_calibration import TravelCalibration, TriggerTravel
-from tests.helpers.felt import felt, field, onsets
+from tests.helpers.messages import field, onsets, uniform_update
 
 USUAL = RenderingSettings()
 STILL = Displacement(0.0, 0.0)
@@ -46,17 +46,17 @@ def test_a_release_does_not_fall() -> None:
     trigger.release()
     assert rendered(0, trigger, 1.0) == (0,) * 10
     rendering = TriggerRendering(USUAL, TravelCalibration())
-    stiff = rendering.render(felt(HEADER, l2=8, r2=8, rumble=0.5), LET_GO, None, 1.0)
+    stiff = rendering.render(uniform_update(HEADER, l2=8, r2=8, rumble=0.5), LET_GO, None, 1.0)
     assert stiff == Feel((8,) * 10, (8,) * 10, Rumble(left=0.5))
     assert rendering.render(None, LET_GO, None, 1.0) == RELEASED
-    assert rendering.render(felt(HEADER), LET_GO, None, 1.0) == RELEASED
+    assert rendering.render(uniform_update(HEADER), LET_GO, None, 1.0) == RELEASED
 
 
 def test_a_contact_is_signalled_by_one_short_pulse_of_the_right_motor() -> None:
     rendering = TriggerRendering(USUAL, TravelCalibration())
 
     def motors(stands: bool, now_s: float, rumble: float = 0.0) -> Rumble | None:
-        return rendering.render(felt(HEADER, stands=stands, rumble=rumble), LET_GO, None, now_s).rumble
+        return rendering.render(uniform_update(HEADER, stands=stands, rumble=rumble), LET_GO, None, now_s).rumble
 
     assert motors(False, 1.0) == Rumble()
     assert motors(True, 1.001) == Rumble(0.0, 0.7)
@@ -70,10 +70,10 @@ def test_a_contact_is_signalled_by_one_short_pulse_of_the_right_motor() -> None:
 
 def test_an_arm_that_begins_not_to_follow_is_signalled_by_two_short_pulses() -> None:
     rendering = TriggerRendering(USUAL, TravelCalibration())
-    rendering.render(felt(HEADER), LET_GO, None, 0.9995)
+    rendering.render(uniform_update(HEADER), LET_GO, None, 0.9995)
     drives = []
     for now_ms in range(1000, 2000):
-        rumble = rendering.render(felt(HEADER, hindered=True, rumble=0.5), LET_GO, None, 1e-3 * now_ms).rumble
+        rumble = rendering.render(uniform_update(HEADER, hindered=True, rumble=0.5), LET_GO, None, 1e-3 * now_ms).rumble
         assert rumble is not None
         assert rumble.left == 0.5
         drives.append(rumble.right)

@@ -10,7 +10,7 @@ from operator_side.controller.feel import FREE_TRIGGER, RELEASED, Feel, Rumble
 from operator_side.core import OperatorSide
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.feel.write_bucket import MOST_WRITES_PER_S, WriteBucket
-from tests.helpers.felt import feedback, felt
+from tests.helpers.messages import feedback, uniform_update
 
 Fields = dict[str, Any]
 STRENGTH = st.sampled_from([0, 1, 3, 8])
@@ -39,7 +39,7 @@ class Run:
     def feel(self, fields: Fields) -> None:
         self.tick += 1
         now_s = self.tick / 1000
-        self.side.receive(encode(felt(self.robot.stamp(now_s), **fields)), now_s)
+        self.side.receive(encode(uniform_update(self.robot.stamp(now_s), **fields)), now_s)
         if (report := self.side.feel_now(now_s)) is not None:
             self.device.write(report, now_s)
             self.written_s.append(now_s)

@@ -12,7 +12,7 @@ from common.touch_speed import touch_speed_m_s
 from operator_side.feel.commands_under_way import Displacement
 from operator_side.feel.zones import moving_along, zone_strengths, zone_travels
 from operator_side.hands.travel_calibration import TriggerTravel
-from tests.helpers.felt import field, onsets
+from tests.helpers.messages import field, onsets
 
 USUAL = zone_travels(TriggerTravel())
 STILL = Displacement(0.0, 0.0)

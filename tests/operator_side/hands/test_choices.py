@@ -5,7 +5,7 @@ import pytest
 from common.protocol.messages import Header
 from operator_side.hands.choices import Choices
 from operator_side.hands.intent import OperatorIntent
-from tests.helpers.felt import telemetry
+from tests.helpers.messages import telemetry
 
 PRESSED, RELEASED = OperatorIntent(next_speed=True), OperatorIntent()
 

@@ -12,7 +12,7 @@ from operator_side.controller.state import Button
 from operator_side.dualsense.simulated.trigger_model import SPRING_PRELOAD_N, SPRING_RISE_N
 from operator_side.people.person import FULL_STICK_M_S, FULL_TRIGGER_M_S, GENTLY_M_S
 from operator_side.people.settings import PersonSettings
-from tests.helpers.felt import feedback
+from tests.helpers.messages import feedback
 from tests.helpers.simulated_desk import (
     CALIBRATION,
     CLEAR_SIGHTED,

@@ -14,7 +14,7 @@ from common.reaction import WRITE_S
 from common.silence import KEEP_ALIVE_S
 from robot_side.reporting.perceptual_deadband import StiffnessDeadband, TelemetryDeadband
 from robot_side.tick.sensed import Sensed
-from tests.helpers.felt import field, onsets
+from tests.helpers.messages import field, onsets
 
 TICK_S = 1e-3
 A_M_S2, FULL_M_S = 3.0, 0.25

@@ -15,7 +15,7 @@ from operator_side.people.pulling_hands import PullingHands, constant_force
 from operator_side.viewing.pages.browser_hands import BrowserHands
 from operator_side.viewing.pages.driving_page import DrivingPage
 from operator_side.viewing.pages.shared_hands import SharedHands
-from tests.helpers.felt import feedback
+from tests.helpers.messages import feedback
 from tests.helpers.simulated_desk import VIEW, armed
 from tests.operator_side.viewing.pages.talking_page import PERIOD_S, TalkingPage
 

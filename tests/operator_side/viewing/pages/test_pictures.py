@@ -8,7 +8,7 @@ import pytest
 from common.protocol.codec import encode
 from common.protocol.view_messages import VIEW_NAMES, VideoFrame
 from operator_side.viewing.pages.pictures import FIRST, Pictures, dead_after_s, old_after_s
-from tests.helpers.felt import felt
+from tests.helpers.messages import uniform_update
 from tests.operator_side.operator_bench import Bench
 from tests.operator_side.viewing.pages.test_browser_hands import Desk
 
@@ -44,7 +44,7 @@ class Watched:
         shares, bench = [], self.bench
         for _ in range(round(for_s / TICK_S)):
             bench.now_s += TICK_S
-            bench.side.receive(encode(felt(bench.robot.stamp(bench.now_s - self._control_s))), bench.now_s)
+            bench.side.receive(encode(uniform_update(bench.robot.stamp(bench.now_s - self._control_s))), bench.now_s)
             while self._captured_s + INTERVAL_S <= bench.now_s:
                 self._captured_s += INTERVAL_S
                 if (delay_s := self._video(self._captured_s - self.start_s)) is not None:

@@ -22,7 +22,7 @@ def field(fast_m: OnsetDistances, slow_m: OnsetDistances | None = None, **change
     return msgspec.structs.replace(uniform_field(0), fast_m=fast_m, slow_m=slow_m or fast_m, **changes)
 
 
-def felt(
+def uniform_update(
     header: Header,
     *,
     l2: int = 0,
