@@ -11,7 +11,7 @@ from msgspec import Meta
 from common.command.run_options import SideOptions
 from common.limits import check_limits
 from common.protocol.messages import Compensation
-from common.sockets.turns import CONNECTIONS, MOST_CONNECTIONS_EACH
+from common.sockets.round_robin import CONNECTIONS, MOST_CONNECTIONS_EACH
 from operator_side.controller.port import check_choice
 from operator_side.feel.rendering import RenderingSettings
 from operator_side.hands.choices import SpeedScale, StickFrame

@@ -5,6 +5,6 @@ and telemetry to the operator; they are separate so that a picture never delays 
 A message that cannot leave now is dropped and counted, because a newer one follows. All sockets of a side are used by
 one thread.
 
-`turns` rotates messages over several connections of one peer; `peers` assigns connections to peers. These two do not
-use ZeroMQ, nor do `keys`, `allow_list`, `endpoints`, `port_connections`, `descriptors` and `admission`.
+`round_robin` rotates messages over several connections of one peer; `peers` assigns connections to peers. These
+two do not use ZeroMQ, nor do `keys`, `allow_list`, `endpoints`, `port_connections`, `descriptors` and `admission`.
 """

@@ -8,8 +8,8 @@ from common.sockets.authentication import Authenticator, RobotKeys
 from common.sockets.endpoints import parse_bind, refuse_open
 from common.sockets.inbox import Inbox
 from common.sockets.readable import user_of
+from common.sockets.round_robin import Offered
 from common.sockets.shell import SocketShell, bind_socket
-from common.sockets.turns import Offered
 
 _HEARTBEAT_S: Final = 1.0
 _HANDSHAKE_S: Final = 5.0

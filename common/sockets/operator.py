@@ -10,6 +10,15 @@ import zmq
 from common.sockets.authentication import HandshakeWatch, OperatorKeys
 from common.sockets.endpoints import Endpoint, following, parse_connect
 from common.sockets.inbox import Inbox
+from common.sockets.round_robin import (
+    CONNECTIONS,
+    MOST_CONNECTIONS_EACH,
+    Offered,
+    RoundRobin,
+    RoundRobinConnection,
+    new_group,
+    routing_id,
+)
 from common.sockets.shell import (
     CONTROL_LIMIT_BYTES,
     CONTROL_UNSENT_BYTES,
@@ -17,15 +26,6 @@ from common.sockets.shell import (
     SocketShell,
     check_size,
     connect_socket,
-)
-from common.sockets.turns import (
-    CONNECTIONS,
-    MOST_CONNECTIONS_EACH,
-    Offered,
-    TurnConnection,
-    Turns,
-    new_group,
-    routing_id,
 )
 
 _RETRY_S = 0.5
@@ -39,7 +39,7 @@ starting."""
 
 
 @dataclass(eq=False)
-class _Connection(TurnConnection):
+class _Connection(RoundRobinConnection):
     """Control connection to the robot side, with its own socket."""
 
     part: "zmq.Socket[bytes]"
@@ -77,7 +77,7 @@ class OperatorSockets(SocketShell):
         self._closing: threading.Thread | None = None
         self._watched: list[tuple[zmq.Socket[bytes], Endpoint, HandshakeWatch]] = []
         self._connections: list[_Connection] = []
-        self._turns: Turns[_Connection] = Turns(self._offer)
+        self._round_robin: RoundRobin[_Connection] = RoundRobin(self._offer)
         super().__init__(heartbeat_timeout_s, _HANDSHAKE_LIMIT_S)
         group, self._next_look_s = new_group(), 0.0
         try:
@@ -89,7 +89,7 @@ class OperatorSockets(SocketShell):
                 part.setsockopt(zmq.IMMEDIATE, 1)
                 self._connections.append(_Connection(part, Inbox(part, frames=1)))
                 self._join(part, control, "--connect", keys, CONTROL_UNSENT_BYTES)
-            self._turns.connections.extend(self._connections)
+            self._round_robin.connections.extend(self._connections)
             self._view = self._open_view(zmq.SUB)
             for topic in topics:
                 self._view.setsockopt(zmq.SUBSCRIBE, topic)
@@ -129,7 +129,7 @@ class OperatorSockets(SocketShell):
         CONTROL_LIMIT_BYTES.
         """
         check_size(payload, CONTROL_LIMIT_BYTES)
-        taken = self._turns.send(payload, self._clock.now(), everywhere=everywhere)
+        taken = self._round_robin.send(payload, self._clock.now(), everywhere=everywhere)
         self.dropped += not taken
         return taken
 

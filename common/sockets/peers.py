@@ -1,4 +1,4 @@
-"""Peers of the robot side; connections that have the same key and the same group (turns.py) are one peer."""
+"""Peers of the robot side; connections that have the same key and the same group (round_robin.py) are one peer."""
 
 from collections import Counter
 from collections.abc import Callable
@@ -6,13 +6,13 @@ from dataclasses import dataclass
 from typing import Final
 
 from common.peer_name import peer_name
-from common.sockets.turns import Offered, TurnConnection, Turns, group_of
+from common.sockets.round_robin import Offered, RoundRobin, RoundRobinConnection, group_of
 
 _REMEMBERED_CONNECTIONS: Final = 1024
 
 
 @dataclass(eq=False)
-class Connection(TurnConnection):
+class Connection(RoundRobinConnection):
     """State of one connection, identified by its ZeroMQ routing id."""
 
     name: bytes
@@ -36,7 +36,7 @@ class Peer:
     name: bytes
     key: str
     """Authenticated public key; empty if the robot side uses no keys."""
-    turns: Turns[Connection]
+    round_robin: RoundRobin[Connection]
 
 
 class Peers:
@@ -70,7 +70,7 @@ class Peers:
             self._forget(min(self.connections.values(), key=lambda each: each.heard_s))
         self._peers[connection.peer.name] = connection.peer
         self.connections[name] = connection
-        connection.peer.turns.connections.append(connection)
+        connection.peer.round_robin.connections.append(connection)
         return connection
 
     def count(self, peer: Peer) -> int:
@@ -84,7 +84,7 @@ class Peers:
         self._received.clear()
 
     def _peer(self, name: bytes, key: str) -> Peer:
-        return self._peers.get(name) or Peer(name, key, Turns(self._offer_or_forget))
+        return self._peers.get(name) or Peer(name, key, RoundRobin(self._offer_or_forget))
 
     def _offer_or_forget(self, connection: Connection, payload: bytes) -> Offered:
         offered = self._offer(connection, payload)
@@ -94,8 +94,8 @@ class Peers:
 
     def _forget(self, connection: Connection) -> None:
         del self.connections[connection.name]
-        connection.peer.turns.forget(connection)
-        if not connection.peer.turns.connections:
+        connection.peer.round_robin.forget(connection)
+        if not connection.peer.round_robin.connections:
             del self._peers[connection.peer.name]
 
 

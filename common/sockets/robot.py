@@ -13,6 +13,7 @@ from common.sockets.gate import Gate
 from common.sockets.inbox import Inbox
 from common.sockets.peers import Connection, Peers
 from common.sockets.readable import EVENTS, descriptor_of, user_of
+from common.sockets.round_robin import Offered
 from common.sockets.shell import (
     CONTROL_LIMIT_BYTES,
     CONTROL_UNSENT_BYTES,
@@ -23,7 +24,6 @@ from common.sockets.shell import (
     check_size,
 )
 from common.sockets.tcp_figures import TcpFigures, tcp_figures
-from common.sockets.turns import Offered
 
 PEER_LIMIT_PER_S = 5000
 """Maximum number of messages a second from one key, or without keys from one peer; above it that key or peer is cut
@@ -152,7 +152,7 @@ class RobotSockets(SocketShell):
             connection = self._admitted(name.bytes, frames[-1] if frames else name)
             if connection is None:
                 continue
-            connection.peer.turns.heard(connection, now_s)
+            connection.peer.round_robin.heard(connection, now_s)
             if len(frames) == 1:
                 received.append((connection.peer.name, frames[0].bytes))
             else:
@@ -170,7 +170,7 @@ class RobotSockets(SocketShell):
         taken = (
             known is not None
             and self._allows(known.key)
-            and known.turns.send(payload, self._clock.now(), everywhere=everywhere)
+            and known.round_robin.send(payload, self._clock.now(), everywhere=everywhere)
         )
         self.dropped += not taken
         return taken
@@ -179,7 +179,7 @@ class RobotSockets(SocketShell):
         """Return the kernel's TCP figures of all connections to `peer`, added up."""
         known = self._peers.get(peer)
         return tcp_figures(
-            [] if known is None else [each.descriptor for each in known.turns.connections if each.number]
+            [] if known is None else [each.descriptor for each in known.round_robin.connections if each.number]
         )
 
     def publish(self, topic: bytes, payload: bytes) -> None:
@@ -284,7 +284,7 @@ class RobotSockets(SocketShell):
         number = crowd.number(descriptor)
         if self._all_seen and number != connection.number and self._is_there(connection):
             connection.stands_for(descriptor, number)
-        for each in peer.turns.connections:
+        for each in peer.round_robin.connections:
             self._hang_up(each)
         return None
 

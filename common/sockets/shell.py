@@ -13,7 +13,7 @@ from common.sockets.authentication import Authenticator
 from common.sockets.endpoints import Endpoint
 from common.sockets.inbox import Inbox
 from common.sockets.readable import EVENTS
-from common.sockets.turns import Offered
+from common.sockets.round_robin import Offered
 
 CONTROL_HIGH_WATER_MARK = 2
 """Length of the send queue of each control connection, in messages. Four connections take a burst of eight messages."""

@@ -49,7 +49,7 @@ def greet(robot: RobotSockets, operator: OperatorSockets) -> bytes:
             if names:
                 break
         peer = robot._peers.get(names[0]) if names else None
-        if peer is not None and len(peer.turns.connections) == connections:
+        if peer is not None and len(peer.round_robin.connections) == connections:
             return names[0]
         robot.wait(0.01)  # Else it would count as flooding.
         operator.receive()  # This connects again after a refused handshake.

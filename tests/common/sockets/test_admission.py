@@ -19,7 +19,7 @@ from common.sockets.admission import AT_ONCE_S, EACH_OTHER_PER_S, OTHERS_PER_S, 
 from common.sockets.peers import peer_name_of
 from common.sockets.port_connections import PortConnections
 from common.sockets.robot import RobotSockets
-from common.sockets.turns import SILENCE_S, Offered, routing_id
+from common.sockets.round_robin import SILENCE_S, Offered, routing_id
 from tests.helpers.socket_talk import EPHEMERAL
 
 LIMIT = 8

@@ -51,8 +51,8 @@ class Offered(Enum):
 
 
 @dataclass(eq=False, kw_only=True)
-class TurnConnection:
-    """State of one of a peer's connections, for taking turns."""
+class RoundRobinConnection:
+    """State of one of a peer's connections, as `RoundRobin` needs it."""
 
     heard_s: float = 0.0
     """Time of the newest message from the connection."""
@@ -62,11 +62,11 @@ class TurnConnection:
     """Time at which a message was last offered to the connection, not counting those sent over all connections."""
 
 
-AnyConnection = TypeVar("AnyConnection", bound=TurnConnection)
+AnyConnection = TypeVar("AnyConnection", bound=RoundRobinConnection)
 
 
-class Turns(Generic[AnyConnection]):
-    """Connections of a peer, which take turns in sending."""
+class RoundRobin(Generic[AnyConnection]):
+    """Connections of a peer, over which messages go in rotation."""
 
     def __init__(self, offer: Callable[[AnyConnection, bytes], Offered]) -> None:
         """`offer` sends a payload over a connection without waiting, and calls `forget` for one that is gone."""

@@ -13,17 +13,17 @@ from common.sockets.descriptors import shut_down
 from common.sockets.operator import OperatorSockets
 from common.sockets.peers import Connection, Peers
 from common.sockets.robot import RobotSockets
-from common.sockets.shell import CONTROL_UNSENT_BYTES, VIEW_HIGH_WATER_MARK, VIEW_UNSENT_BYTES
-from common.sockets.turns import (
+from common.sockets.round_robin import (
     CONNECTIONS,
     MOST_CONNECTIONS_EACH,
     Offered,
-    TurnConnection,
-    Turns,
+    RoundRobin,
+    RoundRobinConnection,
     group_of,
     new_group,
     routing_id,
 )
+from common.sockets.shell import CONTROL_UNSENT_BYTES, VIEW_HIGH_WATER_MARK, VIEW_UNSENT_BYTES
 from tests.helpers.hostile.raw_zmtp import RawConnection, message, port_of
 from tests.helpers.socket_talk import PATIENT_S, ROUNDS, drain_all, greet, publish_until_seen
 
@@ -31,7 +31,7 @@ STIFFNESS = bytes(461)
 
 
 @dataclass(eq=False)
-class Fed(TurnConnection):
+class Fed(RoundRobinConnection):
     answer: Offered = Offered.TAKEN
     taken: int = 0
 
@@ -42,41 +42,41 @@ class Fed(TurnConnection):
 
 @given(answers=st.lists(st.sampled_from([Offered.TAKEN, Offered.FULL]), min_size=1, max_size=16))
 def test_connections_take_turns_and_a_full_one_is_passed_over(answers: list[Offered]) -> None:
-    turns: Turns[Fed] = Turns(Fed.offered)
-    turns.connections.extend(Fed(answer=answer) for answer in answers)
+    round_robin: RoundRobin[Fed] = RoundRobin(Fed.offered)
+    round_robin.connections.extend(Fed(answer=answer) for answer in answers)
     able = answers.count(Offered.TAKEN)
-    assert [turns.send(b"newest", 1.0, everywhere=False) for _ in range(3 * (able or 1))] == [able > 0] * 3 * (
+    assert [round_robin.send(b"newest", 1.0, everywhere=False) for _ in range(3 * (able or 1))] == [able > 0] * 3 * (
         able or 1
     )
-    assert {way.taken for way in turns.connections if way.answer is Offered.TAKEN} <= {3}
-    assert turns.send(b"stop", 1.0, everywhere=True) == (able > 0)
-    assert sum(way.taken for way in turns.connections) == 4 * able
+    assert {way.taken for way in round_robin.connections if way.answer is Offered.TAKEN} <= {3}
+    assert round_robin.send(b"stop", 1.0, everywhere=True) == (able > 0)
+    assert sum(way.taken for way in round_robin.connections) == 4 * able
 
 
 def test_a_full_connection_is_tried_again_soon() -> None:
-    turns: Turns[Fed] = Turns(Fed.offered)
-    turns.connections.append(only := Fed(answer=Offered.FULL))
-    assert not turns.send(b"newest", 1.0, everywhere=False)
+    round_robin: RoundRobin[Fed] = RoundRobin(Fed.offered)
+    round_robin.connections.append(only := Fed(answer=Offered.FULL))
+    assert not round_robin.send(b"newest", 1.0, everywhere=False)
     only.answer = Offered.TAKEN
-    assert not turns.send(b"newest", 1.0005, everywhere=False)
-    assert turns.send(b"newest", 1.0015, everywhere=False)
+    assert not round_robin.send(b"newest", 1.0005, everywhere=False)
+    assert round_robin.send(b"newest", 1.0015, everywhere=False)
 
 
 def test_a_silent_connection_gets_a_copy_twice_a_second_and_returns_once_heard() -> None:
     """Neither end uses a silent connection. Without copies, one that works again would stay silent for ever."""
-    turns: Turns[Fed] = Turns(Fed.offered)
+    round_robin: RoundRobin[Fed] = RoundRobin(Fed.offered)
     lively, silent = Fed(), Fed()
-    turns.connections.extend((lively, silent))
+    round_robin.connections.extend((lively, silent))
     for millisecond in range(2000):
-        turns.heard(lively, now_s := 10.0 + millisecond / 1e3)
-        assert turns.send(b"newest", now_s, everywhere=False)
+        round_robin.heard(lively, now_s := 10.0 + millisecond / 1e3)
+        assert round_robin.send(b"newest", now_s, everywhere=False)
     assert (lively.taken, silent.taken) == (2000, 4)
     lively.answer = Offered.FULL
-    assert not turns.send(b"newest", 12.6, everywhere=False), "whether it is there nobody knows"
+    assert not round_robin.send(b"newest", 12.6, everywhere=False), "whether it is there nobody knows"
     lively.answer = Offered.TAKEN
-    turns.heard(silent, 13.0)
-    turns.heard(lively, 13.0)
-    assert all(turns.send(b"newest", 13.0, everywhere=False) for _ in range(10))
+    round_robin.heard(silent, 13.0)
+    round_robin.heard(lively, 13.0)
+    assert all(round_robin.send(b"newest", 13.0, everywhere=False) for _ in range(10))
     assert silent.taken == 5 + 5
 
 
@@ -99,8 +99,8 @@ def test_peers_and_their_connections_are_bounded() -> None:
             newest = peers.connection(routing_id(group, index), "a key").peer
     assert len(peers.connections) == 1024
     assert len(peers._peers) == 1024 // MOST_CONNECTIONS_EACH
-    assert len(newest.turns.connections) == MOST_CONNECTIONS_EACH
-    assert not newest.turns.send(b"", 0.0, everywhere=True)
+    assert len(newest.round_robin.connections) == MOST_CONNECTIONS_EACH
+    assert not newest.round_robin.send(b"", 0.0, everywhere=True)
     assert peers.get(newest.name) is None, "all that are gone are forgotten"
 
 
@@ -172,7 +172,7 @@ def test_little_waits_for_a_peer_that_stops_reading_and_others_lose_nothing(
             assert robot.send(owner, b"%d" % number)
             drain_all(operator.receive, operator.wait, [b"%d" % number])
         assert taken + robot.dropped == 2000, "the owner lost nothing"
-        for each in robot._peers.get(observer).turns.connections:  # type: ignore[union-attr]
+        for each in robot._peers.get(observer).round_robin.connections:  # type: ignore[union-attr]
             assert unsent_bytes(each.descriptor) <= 8 * 1024
         # The receiver's own buffer takes more than twice its size, as the kernel counts it.
         assert taken * len(STIFFNESS) <= 4 * (16 * 1024 + 4 * receive_bytes)
