@@ -17,17 +17,17 @@ from feelahead.lab.link.bare import BareEnd
 from feelahead.lab.link.ends import BYTES, OperatorEnd, RobotEnd
 
 Kind = Literal["whole ends", "bare ZeroMQ"]
-Take = Callable[[float, float], list[dict[str, float]]]
-"""Function that runs both ends for a turn, given its length and period in seconds. It returns the figures of the
+Measure = Callable[[float, float], list[dict[str, float]]]
+"""Function that runs both ends for a round, given its length and period in seconds. It returns the figures of the
 robot's end, then those of the operator's."""
 _SETTLING_S: Final = 0.4
-"""Time in seconds at a turn's beginning, in which idle sessions resume, and which is not measured."""
+"""Time in seconds at a round's beginning, in which idle sessions resume, and which is not measured."""
 _PATIENCE_S: Final = 120.0
 
 
 @contextmanager
-def pair(kind: Kind) -> Iterator[Take]:
-    """Start both processes, and yield the function that runs a turn; FeelaheadError if an end does not answer."""
+def pair(kind: Kind) -> Iterator[Measure]:
+    """Start both processes, and yield the function that runs a round; FeelaheadError if an end does not answer."""
     context = multiprocessing.get_context("spawn")
     with ExitStack() as stack:
         pipes: list[Connection] = []
@@ -40,14 +40,14 @@ def pair(kind: Kind) -> Iterator[Take]:
             pipes.append(ours)
             address = _heard(ours, 0.0)
 
-        def take(seconds: float, period_s: float) -> list[dict[str, float]]:
+        def measure(seconds: float, period_s: float) -> list[dict[str, float]]:
             start_s = MonotonicClock().now()
             for place, pipe in enumerate(pipes):
                 # Half a period apart, so that deadlines and messages never coincide by chance.
                 pipe.send((start_s + 0.5 * place * period_s, seconds, period_s))
             return [_heard(pipe, seconds) for pipe in pipes]
 
-        yield take
+        yield measure
 
 
 def _heard(pipe: Connection, expected_s: float) -> Any:
@@ -60,7 +60,7 @@ def _heard(pipe: Connection, expected_s: float) -> Any:
 
 
 def _serve(kind: Kind, place: int, address: Any, orders: Connection) -> None:
-    """Run the process of one end: run a turn for each order that comes, until the connection is closed."""
+    """Run the process of one end: run a round for each order that comes, until the connection is closed."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the caller ends this process
     raise_priority()  # before there are sockets, whose threads inherit it
     with ExitStack() as stack:
@@ -78,12 +78,14 @@ def _serve(kind: Kind, place: int, address: Any, orders: Connection) -> None:
             orders.send(None)
         while True:
             try:
-                orders.send(_turn(end, *orders.recv()))
+                orders.send(_measured(end, *orders.recv()))
             except EOFError:
                 return
 
 
-def _turn(end: BareEnd | RobotEnd | OperatorEnd, start_s: float, seconds: float, period_s: float) -> dict[str, float]:
+def _measured(
+    end: BareEnd | RobotEnd | OperatorEnd, start_s: float, seconds: float, period_s: float
+) -> dict[str, float]:
     """Run the end from `start_s`, and return its figures, measured after `_SETTLING_S`."""
     began: tuple[float, float, int] | None = None
     now_s = start_s

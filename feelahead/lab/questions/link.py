@@ -30,7 +30,7 @@ from feelahead.printing.figures import shown
 
 _BARE_LIMIT: Final = 1.3
 _KINDS: Final[tuple[Kind, ...]] = ("whole ends", "bare ZeroMQ")
-_TURNS: Final = 7
+_ROUNDS: Final = 7
 _PAIRS: Final = 10
 """Number of pairs of runs of the model that are compared with each other, for each seed."""
 _COMPARED: Final = (
@@ -81,31 +81,33 @@ class LinkSweep(Played, Sweep):
 
 
 @dataclass(frozen=True)
-class Turns:
-    """Cell that measures our ends and bare ZeroMQ's in turns."""
+class Interleaved:
+    """Cell that measures our ends and bare ZeroMQ's, interleaved."""
 
     rate: float
-    turns: int
+    rounds: int
 
 
-def cells(settings: LinkSweep) -> Iterator[Turns | Played]:
+def cells(settings: LinkSweep) -> Iterator[Interleaved | Played]:
     """Yield the one cell that the flags choose."""
-    yield cell_of(Played, settings) if settings.virtual else Turns(settings.rate, 2 if settings.quick else _TURNS)
+    yield (
+        cell_of(Played, settings) if settings.virtual else Interleaved(settings.rate, 2 if settings.quick else _ROUNDS)
+    )
 
 
-def run(cell: Turns | Played, seed: int) -> Iterator[Row]:
+def run(cell: Interleaved | Played, seed: int) -> Iterator[Row]:
     """Run one cell."""
     if isinstance(cell, Played):
         yield _play(cell, seed)
     else:
         with ExitStack() as stack:
-            takes = {kind: stack.enter_context(pair(kind)) for kind in _KINDS}
-            for turn in range(cell.turns):
-                for kind, take in takes.items():
-                    robot, operator = take(1.0, 1.0 / cell.rate)
+            measures = {kind: stack.enter_context(pair(kind)) for kind in _KINDS}
+            for number in range(cell.rounds):
+                for kind, measure in measures.items():
+                    robot, operator = measure(1.0, 1.0 / cell.rate)
                     shares: Row = {"robot": robot["share"], "operator": operator["share"]}
                     sent = 0.5 * (robot["sent_per_s"] + operator["sent_per_s"])
-                    yield {"turn": turn, "kind": kind} | shares | {"sent_per_s": sent}
+                    yield {"round": number, "kind": kind} | shares | {"sent_per_s": sent}
 
 
 def _play(cell: Played, seed: int) -> Row:
@@ -144,16 +146,16 @@ def show(settings: LinkSweep, table: Table) -> Iterator[RenderableType]:
         groups = ((kind, rows) for (kind,), rows in table.groups("kind"))
         shares = ((kind, *(float(np.median(rows.values(name))) for name in names)) for kind, rows in groups)
         yield shown(
-            "shares of a core without spinning and without a link, in turns (medians)", ("ends", *names), shares
+            "shares of a core without spinning and without a link, interleaved (medians)", ("ends", *names), shares
         )
 
 
-def ratio(turns: Table) -> float:
-    """Return how many times more processor time our ends take than bare ZeroMQ's: the median over all turns.
+def ratio(rounds: Table) -> float:
+    """Return how many times more processor time our ends take than bare ZeroMQ's: the median over all rounds.
 
-    Both are compared within a turn, as the machine's speed varies.
+    Both are compared within a round, as the machine's speed varies.
     """
-    ours, bare = ([row["robot"] + row["operator"] for row in turns.where(kind=kind)] for kind in _KINDS)
+    ours, bare = ([row["robot"] + row["operator"] for row in rounds.where(kind=kind)] for kind in _KINDS)
     return float(np.median(np.divide(ours, bare)))
 
 

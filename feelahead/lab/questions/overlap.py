@@ -20,6 +20,7 @@ from common.clock import MonotonicClock
 from common.files.input_file import require_input_file
 from feelahead.lab.figures import figure
 from feelahead.lab.goals import Goal
+from feelahead.lab.interleaved import interleaved, least_ns
 from feelahead.lab.reference import errors
 from feelahead.lab.reference.approximations import SLOW, satellites
 from feelahead.lab.reference.classes import DEPTHS, MAKERS, family, frozen_class
@@ -29,7 +30,6 @@ from feelahead.lab.reference.pairs import Pairs
 from feelahead.lab.reference.published import SDIST, CompiledHeader, PythonPackage
 from feelahead.lab.sweep import Question, Sweep
 from feelahead.lab.table import Row, Table
-from feelahead.lab.turns import in_turns, least_ns
 from feelahead.printing.figures import shown
 from robot_side.overlap import Mesh, sphere_box, sphere_tetrahedron
 
@@ -80,26 +80,26 @@ class Piece:
     case: str
     grid: bool
     count: int
-    turns: int
+    rounds: int
     header: str | None = None
 
 
 def cells(settings: OverlapSweep) -> Iterator[Piece]:
     """Yield the cells: first those that measure time, then errors and counts for each class."""
-    turns, timed = (5 if settings.quick else 20), settings.timed
+    rounds, timed = (5 if settings.quick else 20), settings.timed
     header = None if settings.peer_header is None else str(settings.peer_header)
     truths = settings.truths or (6 if settings.quick else 40)
     wanted = settings.adversarial or (20_000 if settings.quick else 100_000)
     for solid, case in product(_FLAT_FACED, _SPEED):
-        yield Piece("speed", solid, case, False, timed, turns, header)
+        yield Piece("speed", solid, case, False, timed, rounds, header)
     for radius in _RADII:
-        yield Piece("mesh", "mesh", f"{radius:g}", False, min(timed, 500), turns)
+        yield Piece("mesh", "mesh", f"{radius:g}", False, min(timed, 500), rounds)
     for solid, case in product(_FLAT_FACED, _TRADED):
         yield Piece("tradeoff", solid, case, False, truths, 2 if settings.quick else 4)
     for one in _CLASSES:
-        yield Piece("accuracy", *one, truths, turns)
+        yield Piece("accuracy", *one, truths, rounds)
     for one in _CLASSES:
-        yield Piece("adversarial", *one, -(-wanted // len(_CLASSES)), turns)
+        yield Piece("adversarial", *one, -(-wanted // len(_CLASSES)), rounds)
 
 
 def run(cell: Piece, seed: int) -> Iterator[Row]:
@@ -129,7 +129,7 @@ def _checked(pairs: Pairs) -> object:
 
 
 def _speed(cell: Piece, seed: int) -> Iterator[Row]:
-    """Measure all methods in turns on the same pairs; the least time of each batch counts."""
+    """Measure all methods interleaved on the same pairs; the least time of each batch counts."""
     clock = MonotonicClock()
     pairs = errors.partial_pairs(cell.solid, cell.count, seed + 1) if cell.case == "random" else _pairs(cell, seed + 1)
     batches = [pairs[slice(first, first + _BATCH)] for first in range(0, len(pairs), _BATCH)]
@@ -139,11 +139,11 @@ def _speed(cell: Piece, seed: int) -> Iterator[Row]:
     }
     package, header = PythonPackage(), _header(cell.header)
     if not header.missing:
-        contenders[HEADER] = lambda: header.turn(pairs)[0]
+        contenders[HEADER] = lambda: header.timed(pairs)[0]
     for method, missing in ((PACKAGE, package.missing), (HEADER, header.missing)):
         if missing:
             yield {"method": method, "missing": missing}
-    for method, time_ns in in_turns(contenders, cell.turns).items():
+    for method, time_ns in interleaved(contenders, cell.rounds).items():
         yield {"method": method, "ns": time_ns / len(pairs)}
 
 
@@ -178,7 +178,7 @@ def _tradeoff(cell: Piece, seed: int) -> Iterator[Row]:
     truths = true_overlaps(pairs)
     methods: dict[str, tuple[Callable[[Pairs], FloatArray], int]]
     methods = {"ours, batch": (errors.kernel_volumes, _BATCH), "29 points": (satellites, _BATCH)}
-    methods |= {name: (volumes_of, cell.turns) for name, volumes_of in SLOW.items()}
+    methods |= {name: (volumes_of, cell.rounds) for name, volumes_of in SLOW.items()}
     if not (package := PythonPackage()).missing:
         methods[PACKAGE] = package.volumes, len(pairs)
     cut = np.flatnonzero([truth.faces_cut > 0 and truth.area != 0 for truth in truths])
@@ -200,8 +200,8 @@ def _mesh(cell: Piece, seed: int) -> Iterator[Row]:
     mesh, spheres = Mesh(*torus(100, 50)), (around_torus(rng, cell.count, radius), radius)
     query = functools.partial(mesh.overlap, *spheres)
     calls = (("ns", query), ("gradient_ns", functools.partial(query, gradient=True)))
-    turns = {name: functools.partial(least_ns, [call], clock) for name, call in calls}
-    times = {name: time_ns / cell.count for name, time_ns in in_turns(turns, cell.turns).items()}
+    contenders = {name: functools.partial(least_ns, [call], clock) for name, call in calls}
+    times = {name: time_ns / cell.count for name, time_ns in interleaved(contenders, cell.rounds).items()}
     yield {"method": "ours", "triangles": float(mesh.counts(*spheres).mean()), **times}
 
 

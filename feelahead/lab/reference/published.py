@@ -87,7 +87,7 @@ class CompiledHeader:
             errors = [line for line in said.stderr.splitlines() if "error" in line]
             self.missing = f"does not compile: {(errors or ['unknown error'])[0][:200]}" if said.returncode else ""
 
-    def turn(self, pairs: Pairs) -> tuple[FloatArray, FloatArray]:
+    def timed(self, pairs: Pairs) -> tuple[FloatArray, FloatArray]:
         """Compute all pairs twice in another process; return the least times in ns (parts,), and the volumes (p,)."""
         corners = package_corners(pairs)
         rows = np.concatenate([pairs.centers, pairs.radii[:, None], corners.reshape(len(pairs), -1)], axis=1)

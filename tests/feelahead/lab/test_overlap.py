@@ -125,7 +125,7 @@ def test_the_driver_reads_pairs_and_writes_volumes(tmp_path: Path, monkeypatch: 
         assert np.all(np.einsum("ni,ni->n", np.cross(sides[0], sides[1]), sides[2]) >= 0.0), solid
         expected = pairs.centers[:, 0] + 10 * pairs.radii + 100 * corners[:, 0, 1] + 1000 * corners[:, -1, 2]
         expected[2] = np.nan
-        times_ns, volumes = peer.turn(pairs)
+        times_ns, volumes = peer.timed(pairs)
         np.testing.assert_allclose(volumes, expected, rtol=1e-13)
         assert (times_ns >= 0.0).all()
     header.write_text("#error this is not the header")
