@@ -15,7 +15,7 @@ from common.periods import TURN
 from common.protocol.messages import Vector2
 from feelahead.both_sides.loopback import Loopback, LoopbackSettings, robot_parts
 from feelahead.lab.approaches.arming import wait_for_pull
-from feelahead.lab.approaches.laws import ComparedLaw, compensation_of, law_of_robot
+from feelahead.lab.approaches.laws import TriedLaw, compensation_of, law_of_robot
 from feelahead.lab.approaches.outcome import SAMPLE_S, End, Outcome, Trace, reversals, stands
 from operator_side.controller.feel import MAX_STRENGTH, ZONE_COUNT, Feel
 from operator_side.controller.state import ControllerState
@@ -60,7 +60,7 @@ class Approach:
     """Force in newtons with which the strongest effect resists (assumed: no trigger has been measured)."""
     link: str = ""
     link_model: LinkModel = "datagram"
-    law: ComparedLaw = "swept"
+    law: TriedLaw = "swept"
     probability: float = 0.99
     duration_s: float = 8.0
     """Time from the beginning of the pull to the end of the run."""

@@ -18,7 +18,7 @@ from common.arrays import FloatArray
 from common.reaction import REACTION_S
 from feelahead.lab.approaches.frozen import PASSED, SITE, frozen_scene
 from feelahead.lab.approaches.judging import false_alarms, strength_before_release
-from feelahead.lab.approaches.laws import ComparedLaw
+from feelahead.lab.approaches.laws import TriedLaw
 from feelahead.lab.approaches.placements import Collision, first_touch_s, place
 from feelahead.lab.approaches.pulls import PullKind
 from feelahead.lab.approaches.recording import record_approach
@@ -82,7 +82,7 @@ class Pulls:
     sizes: tuple[int, int]
     """Number of approaches, and of object placements for each."""
     probabilities: tuple[float, ...]
-    laws: tuple[ComparedLaw, ...]
+    laws: tuple[TriedLaw, ...]
     judged_s: float = 60.0
     """Seconds with R2 pulled, at least, in which false alarms are counted for each cell."""
 

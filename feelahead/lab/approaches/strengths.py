@@ -10,7 +10,7 @@ import numpy as np
 from common.arrays import FloatArray, IntArray
 from common.protocol.around import PERIOD_S
 from common.protocol.messages import Header, StiffnessUpdate
-from feelahead.lab.approaches.laws import ComparedLaw, compensation_of, law_of_robot
+from feelahead.lab.approaches.laws import TriedLaw, compensation_of, law_of_robot
 from feelahead.lab.approaches.replay import Replay
 from operator_side.controller.feel import MAX_STRENGTH, SENSED_TRAVEL, ZONE_COUNT
 from operator_side.feel.commands_under_way import Displacement, Report
@@ -74,7 +74,7 @@ class Judged:
     rendered between the given times, so a strength falls by several steps at once from one time to the next.
     """
 
-    law: ComparedLaw
+    law: TriedLaw
     probability: float
 
     def strengths(self, draw: Draw, times_s: FloatArray) -> IntArray:

@@ -24,13 +24,7 @@ from common.periods import TURN
 from common.protocol.messages import Compensation, Vector2
 from feelahead.lab.approaches.approach import Approach, compile_kernels, run_approach
 from feelahead.lab.approaches.frozen import AHEAD, ASIDE, GRIPPED, SCENES, SITE, frozen_hash, frozen_scene, scene_names
-from feelahead.lab.approaches.laws import (
-    ComparedLaw,
-    compensation_of,
-    in_words,
-    with_compensation,
-    without_compensation,
-)
+from feelahead.lab.approaches.laws import TriedLaw, compensation_of, in_words, with_compensation, without_compensation
 from feelahead.lab.approaches.links import mean_loop_s, require_young_loop
 from feelahead.lab.approaches.outcome import Outcome
 from feelahead.lab.figures import LAW_COLOURS, figure
@@ -120,7 +114,7 @@ class ApproachSettings(Sweep):
         """Return the files of the scenes to try; ConfigurationError if the frozen scenes are missing."""
         return self.model or tuple(frozen_scene(name) for name in (_QUICK if self.quick else (*AHEAD, *ASIDE)))
 
-    def laws(self) -> tuple[ComparedLaw, ...]:
+    def laws(self) -> tuple[TriedLaw, ...]:
         """Return the laws to compare, each once."""
         if not self.haptics:
             return ("none",)
@@ -277,7 +271,7 @@ def _draw_comparison(table: Table, frozen: str, path: Path) -> None:
         drawn.legend(loc="outside right upper", fontsize=7)
 
 
-def _law(row: Row) -> ComparedLaw:
+def _law(row: Row) -> TriedLaw:
     return with_compensation(row["law"], row["compensation"])
 
 

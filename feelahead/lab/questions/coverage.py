@@ -17,7 +17,7 @@ from rich.table import Table as Shown
 from feelahead.lab.approaches.approach import compile_kernels
 from feelahead.lab.approaches.evaluation import LINKS, Placement, Pulls, evaluate
 from feelahead.lab.approaches.frozen import AHEAD, PASSED, frozen_hash
-from feelahead.lab.approaches.laws import LAWS, ComparedLaw
+from feelahead.lab.approaches.laws import LAWS, TriedLaw
 from feelahead.lab.approaches.pulls import PULL_KINDS, PullKind
 from feelahead.lab.figures import LAW_COLOURS, figure
 from feelahead.lab.sweep import Question, Sweep
@@ -50,7 +50,7 @@ class CoverageSettings(Sweep):
     --quick: a few cells in three minutes, instead of all in two hours.
     """
 
-    laws: tuple[ComparedLaw, ...] = LAWS
+    laws: tuple[TriedLaw, ...] = LAWS
     """Laws to compare."""
     probabilities: Annotated[tuple[_Probability, ...], tyro.conf.arg(metavar="P...")] = ()
     """Judge only these P, instead of those planned for each cell; each takes n >= 10/(1 - P) draws for each cell."""

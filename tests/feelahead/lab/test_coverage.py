@@ -16,7 +16,7 @@ from feelahead.lab.approaches.judging import (
     false_alarms,
     strength_before_release,
 )
-from feelahead.lab.approaches.laws import ComparedLaw
+from feelahead.lab.approaches.laws import TriedLaw
 from feelahead.lab.approaches.placements import first_touch_s, last_release_s
 from feelahead.lab.approaches.pulls import PullKind, make_pull
 from feelahead.lab.approaches.recording import RecordedApproach, record_approach
@@ -106,14 +106,14 @@ def test_moving_objects_are_touched_where_they_are_by_then(speed_m_s: float) -> 
 # Covered, alarmed
 
 
-def strength(law: ComparedLaw, link: str = "0 ms", ahead_m: float = 0.0) -> int:
+def strength(law: TriedLaw, link: str = "0 ms", ahead_m: float = 0.0) -> int:
     draw, _, last_s = approaching(link, ahead_m)
     return strength_before_release(Judged(law, 0.99), draw, last_s)
 
 
 @pytest.mark.parametrize(("link", "ahead_m"), [("0 ms", 0.0), ("200 ms", -0.15)])
 def test_a_steady_pull_is_covered_by_either_compensation_and_not_by_the_plain_law(link: str, ahead_m: float) -> None:
-    laws: tuple[ComparedLaw, ...] = ("full", "swept", "swept_robot", "paper", "none")
+    laws: tuple[TriedLaw, ...] = ("full", "swept", "swept_robot", "paper", "none")
     found = {law: strength(law, link=link, ahead_m=ahead_m) for law in laws}
     assert found["full"] == found["swept"] == found["swept_robot"] == 8
     assert max(found["paper"], found["none"]) < 8
@@ -138,7 +138,7 @@ def test_strength_without_cause_is_an_alarm_and_only_that() -> None:
 
 
 @pytest.mark.parametrize("law", ["swept", "swept_robot", "paper"])
-def test_over_a_whole_pull_it_is_what_both_sides_show_live(law: ComparedLaw) -> None:
+def test_over_a_whole_pull_it_is_what_both_sides_show_live(law: TriedLaw) -> None:
     link = LINKS["200 ms"]
     approach = Approach(frozen_scene("wall"), 0.0, strongest_n=0.0, link=link, law=law, seed=SEED, full_rate=True)
     run = PullRun(approach, make_pull("steady", SEED))
@@ -174,7 +174,7 @@ def test_intervals_are_over_approaches() -> None:
     assert 0.8 < low < 0.92 < high < 1.0
 
 
-def judged(laws: tuple[ComparedLaw, ...], *scenes: str) -> list[Row]:
+def judged(laws: tuple[TriedLaw, ...], *scenes: str) -> list[Row]:
     placements = tuple(map(Placement, scenes))
     return list(evaluate(Pulls("bell", "200 ms", "empty", placements, (1, 2), (0.5,), laws, judged_s=12.0), 1))
 
