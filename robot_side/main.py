@@ -70,11 +70,11 @@ def command(arguments: Sequence[str], adapt: Callable[[RobotParts], Adapted] = a
         epoch, recording = secrets.randbits(53), process.recording
         # Fail at once for an occupied port; open meanwhile, so that a driver's flag with the same port is named.
         with closing(open_sockets()):
-            beside = ConnectedDrivers(
+            drivers = ConnectedDrivers(
                 settings.arm, settings.objects, process.note, insecure=settings.insecure, keys=keys
             )
-            process.stack.enter_context(beside)
-        parts = build_parts(settings, epoch, clock_domain(), announce=process.note, beside=beside)
+            process.stack.enter_context(drivers)
+        parts = build_parts(settings, epoch, clock_domain(), announce=process.note, drivers=drivers)
         recorder = [] if recording is None else [Recorder(recording.noted.append)]
         core_parts, others = adapt(parts)
         physics = PhysicsTime(loop.clock, settings.seed)
@@ -88,7 +88,7 @@ def command(arguments: Sequence[str], adapt: Callable[[RobotParts], Adapted] = a
             now_s = loop.clock.now()
             cameras.update(now_s, now_s, (), expected=True)
         warm_up(lambda ready, of: process.note(_COMPILING.format(ready, of)), parts.kernels)
-        beside.wait()
+        drivers.wait()
         if recording is not None:
             also = {"kernels": kernel_digests(), "notes": parts.notes}
             recording.begin(provenance(settings, epoch, clock_domain()) | also)
@@ -102,7 +102,7 @@ def command(arguments: Sequence[str], adapt: Callable[[RobotParts], Adapted] = a
             for text in keys.notes() if keys is not None else [_OPEN_TO_ALL] if settings.insecure else []:
                 process.note(text)
             status.event("listening", control=sockets.control_endpoint, view=sockets.view_endpoint)
-            turns = RobotTurns(settings, core, view, cameras, sockets, process, beside, physics)
+            turns = RobotTurns(settings, core, view, cameras, sockets, process, drivers, physics)
             process.stack.enter_context(late_kernels(turns.note_late))
             return turns
 

@@ -83,12 +83,12 @@ def build_parts(
     clock_domain: str,
     scene: Scene | None = None,
     announce: Callable[[str], None] | None = None,
-    beside: ConnectedDrivers | None = None,
+    drivers: ConnectedDrivers | None = None,
 ) -> SceneParts:
     """Make the parts; ConfigurationError for a model that cannot be used.
 
     scene: used instead of the scene that the settings name. announce: called with each note as soon as it is known, so
-    that those about the model come before a long search. beside: the connected drivers, whose arm and objects replace
+    that those about the model come before a long search. drivers: the connected drivers, whose arm and objects replace
     the simulated ones.
     """
     if (settings.model is None) != (settings.site is None):
@@ -102,7 +102,7 @@ def build_parts(
     noise, camera_noise = np.random.SeedSequence(settings.seed).generate_state(2)
     encoder = Encoder(settings.encoder.sigma_rad, settings.encoder.resolution_rad, int(noise))
     limits = MotionLimits()
-    arm, ends_rad, travel = _arm(scene, encoder, limits, beside)
+    arm, ends_rad, travel = _arm(scene, encoder, limits, drivers)
     notes = _notes(scene, settings, travel)
     if settings.model is not None and isinstance(arm, MujocoArm):
         notes += tuple(following_findings(scene, arm, limits))
@@ -112,7 +112,7 @@ def build_parts(
     searching = None if announce is None else SearchNotes(announce)
     kinematics = MujocoKinematics(scene, settings.cover_m, searching)
     camera = _camera(settings, scene, int(camera_noise))
-    seen_elsewhere = None if beside is None else beside.objects(settings.roles, settings.camera.sd_m)
+    seen_elsewhere = None if drivers is None else drivers.objects(settings.roles, settings.camera.sd_m)
     # Before the first tick, as a search for spheres takes far longer than one.
     first = _as_loaded(scene, scene.roles) if settings.objects is None else perceived([], [], 0.0)
     held_covers = HeldCovers(first, settings.cover_m, scene.never_held, searching)
@@ -166,9 +166,9 @@ def build_parts(
 
 def _episodes(settings: RobotSettings, arm: MujocoArm | RemoteArm, camera: MujocoCamera) -> Episodes:
     """Return the judge of marks: a driver's arm does not go home by itself, nor do objects that are seen elsewhere."""
-    beside = [f"--{what}" for what in ("arm", "objects") if getattr(settings, what) is not None]
-    if beside or not isinstance(arm, MujocoArm):
-        return Episodes(refuses=f"{' and '.join(beside)}: a driver's things stay; valid: all simulated")
+    driven = [f"--{what}" for what in ("arm", "objects") if getattr(settings, what) is not None]
+    if driven or not isinstance(arm, MujocoArm):
+        return Episodes(refuses=f"{' and '.join(driven)}: a driver's things stay; valid: all simulated")
 
     def put_back() -> None:
         arm.put_back()
@@ -178,17 +178,17 @@ def _episodes(settings: RobotSettings, arm: MujocoArm | RemoteArm, camera: Mujoc
 
 
 def _arm(
-    scene: Scene, encoder: Encoder, limits: MotionLimits, beside: ConnectedDrivers | None
+    scene: Scene, encoder: Encoder, limits: MotionLimits, drivers: ConnectedDrivers | None
 ) -> tuple[MujocoArm | RemoteArm, tuple[FloatArray, FloatArray], GripperTravel | None]:
     """Return the arm, simulated or a driver's; its joints' lower and upper ends, (n,) each; the gripper's travel."""
-    if beside is None or not beside.has_arm:
+    if drivers is None or not drivers.has_arm:
         simulated = MujocoArm(scene, encoder, limits)
         return simulated, simulated.ends_rad, simulated.travel
     robot, (travel, ends_rad) = scene.robot, stand(scene)
     opening_m = 0.0 if travel is None else float(travel.openings_m[0])
     open_fingers = scene.data.qpos[robot.finger_positions].copy()
     shape = ArmShape(*joint_names(scene), open_fingers, opening_m)
-    return beside.arm(shape, scene.show), ends_rad, travel
+    return drivers.arm(shape, scene.show), ends_rad, travel
 
 
 def _camera(settings: RobotSettings, scene: Scene, seed: int) -> MujocoCamera:

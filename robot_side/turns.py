@@ -39,11 +39,11 @@ class RobotTurns:
         cameras: Cameras | None,
         sockets: RobotSockets,
         process: Process,
-        beside: ConnectedDrivers,
+        drivers: ConnectedDrivers,
         physics: PhysicsTime,
     ) -> None:
         """cameras: None if no pictures are made."""
-        self._process, self._core, self._sockets, self._beside = process, core, sockets, beside
+        self._process, self._core, self._sockets, self._drivers = process, core, sockets, drivers
         core.parts.arm.give_way(process.loop.clock)
         self._times = TickTimes(process.loop, core.parts.arm, physics, process.note, settings.seed)
         self._admission = Admission()
@@ -126,7 +126,7 @@ class RobotTurns:
             **self._process.loop.pacer.summary(),
             "link": self._sending.summary(),
             "rate": {"robot": self._sending.budget.summary() | {"pictures": self._looking.pictures}},
-            "beside": self._beside.summary(),
+            "drivers": self._drivers.summary(),
             "looked_at": self._looking.summary(),
             "compiled_late": self._compiled_late,
             "strangers": {

@@ -18,13 +18,13 @@ SETTINGS = RobotSettings(arm=EPHEMERAL, objects=EPHEMERAL, roles={"ball": Role.S
 @pytest.mark.processes
 def test_a_robot_side_waits_for_both_and_knows_no_truth(scene: Scene) -> None:
     notes: list[str] = []
-    with ConnectedDrivers(SETTINGS.arm, SETTINGS.objects, notes.append) as beside:
-        parts = build_parts(SETTINGS, 1, "clock", scene, beside=beside)
+    with ConnectedDrivers(SETTINGS.arm, SETTINGS.objects, notes.append) as drivers:
+        parts = build_parts(SETTINGS, 1, "clock", scene, drivers=drivers)
         assert parts.notes[0].startswith("the driver's joints, in this order: shoulder_pan, shoulder_lift")
-        arm_at, objects_at = (port.endpoint for port in beside._ports.values())
+        arm_at, objects_at = (port.endpoint for port in drivers._ports.values())
         with running("example_arm.py", arm_at), running("example_objects.py", objects_at):
-            beside.wait()
-            robot, port = RobotSide(parts), beside._ports["--arm"]
+            drivers.wait()
+            robot, port = RobotSide(parts), drivers._ports["--arm"]
             for _ in range(200):
                 now_s = port.wait(0.001)
                 robot.tick(now_s)
@@ -42,7 +42,7 @@ def test_a_robot_side_waits_for_both_and_knows_no_truth(scene: Scene) -> None:
     ]
     summary = robot.summary()
     assert [summary["contacts"], summary["min_distance_mm"], summary["task"]["placing"]] == [None] * 3
-    assert beside.summary()["arm"].keys() == {"accepted"}
+    assert drivers.summary()["arm"].keys() == {"accepted"}
     # Measurements in the simulation hold for no other arm.
     assert any("has not been measured" in note for note in parts.notes)
     with pytest.raises(ConfigurationError, match="roles: there is no object 'ball'"):
