@@ -34,7 +34,7 @@ _KINDS: Final[dict[Input, Kind]] = {
 }
 
 
-class Recorder(Listener):
+class OperatorRecorder(Listener):
     """Listener that passes each input and output of the core to `note`."""
 
     def __init__(self, note: Callable[[Any], None]) -> None:
@@ -57,7 +57,7 @@ class Recorder(Listener):
 
 
 class OperatorEncoder:
-    """Encodes the notes of `Recorder` as entries of a recording."""
+    """Encodes the notes of `OperatorRecorder` as entries of a recording."""
 
     def begin_epoch(self) -> None:
         """Do nothing, as each entry can be read without earlier ones."""
@@ -84,6 +84,6 @@ def build_recorded(settings: OperatorSettings, epoch: int, recording: SideRecord
     """Build the core from `settings`; record its inputs and outputs if there is a `recording`."""
     if recording is None:
         return build_operator_side(settings, epoch, clock_domain())
-    core = build_operator_side(settings, epoch, clock_domain(), [Recorder(recording.noted.append)])
+    core = build_operator_side(settings, epoch, clock_domain(), [OperatorRecorder(recording.noted.append)])
     recording.begin(provenance(settings, epoch, clock_domain()))
     return core

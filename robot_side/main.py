@@ -23,7 +23,7 @@ from robot_side.core.robot_side import RobotSide
 from robot_side.drivers.mujoco.viewpoints import first_person_eye, overview_eye
 from robot_side.drivers.remote.connected_drivers import ConnectedDrivers
 from robot_side.parts import build_parts
-from robot_side.recording.recorder import Recorder, RobotEncoder
+from robot_side.recording.recorder import RobotEncoder, RobotRecorder
 from robot_side.settings import RobotSettings
 from robot_side.tick.events import Listener
 from robot_side.tick.outgoing import SENT_STREAMS
@@ -75,7 +75,7 @@ def command(arguments: Sequence[str], adapt: Callable[[RobotParts], Adapted] = a
             )
             process.stack.enter_context(drivers)
         parts = build_parts(settings, epoch, clock_domain(), announce=process.note, drivers=drivers)
-        recorder = [] if recording is None else [Recorder(recording.noted.append)]
+        recorder = [] if recording is None else [RobotRecorder(recording.noted.append)]
         core_parts, others = adapt(parts)
         physics = PhysicsTime(loop.clock, settings.seed)
         core = RobotSide(core_parts, [physics, *recorder, *others])

@@ -45,10 +45,10 @@ def main() -> None:
         listener.bind(arguments[1])
         listener.listen(_SIDES_LIMIT)
     owner.send(as_json(file.figures()))
-    _Recorder(file, owner, listener).run()
+    _Writer(file, owner, listener).run()
 
 
-class _Recorder:
+class _Writer:
     def __init__(self, file: RecordingFile, owner: Channel, listener: socket.socket | None) -> None:
         self._file = file
         self._owner = owner

@@ -177,7 +177,7 @@ def recording_to(path: Path | None, side: str, encoder: Encoder) -> Iterator[Sid
             recording.close()
 
 
-class Recorder:
+class RecorderProcess:
     """Recorder process that writes one file, for this side or, at `socket_path`, for all sides that connect there."""
 
     def __init__(self, path: Path, socket_path: Path | None = None) -> None:
@@ -219,13 +219,13 @@ class Recorder:
         self._companion.close(_FINISH_LIMIT_S)
 
 
-def connect(path: Path) -> tuple[Channel, Recorder | None]:
+def connect(path: Path) -> tuple[Channel, RecorderProcess | None]:
     """If `path` is a socket, connect to the recorder that listens there; otherwise start one that writes to `path`.
 
     Return the channel to the recorder, and the recorder if it was started here.
     """
     if not path.is_socket():
-        recorder = Recorder(path)
+        recorder = RecorderProcess(path)
         return recorder.channel, recorder
     part = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
     try:

@@ -20,7 +20,7 @@ from robot_side.tick.events import Listener, Tick
 _HAPTICS: Final = b"haptics"
 
 
-class Recorder(Listener):
+class RobotRecorder(Listener):
     """Listener that gives each payload and each tick to the function `note`."""
 
     def __init__(self, note: Callable[[Any], None]) -> None:

@@ -14,7 +14,7 @@ from common.emulation.figures import report_lines
 from common.emulation.spec import Direction, Stream, unused_clauses
 from common.errors import ConfigurationError
 from common.files.output_file import write_json
-from common.recording.side import Recorder
+from common.recording.side import RecorderProcess
 from feelahead.both_sides.settings_files import check_settings_files
 from feelahead.both_sides.summary import merge_summaries, read_summary
 from feelahead.commands.demo.compare import compare
@@ -47,7 +47,9 @@ def demo(arguments: Sequence[str]) -> int:
             with tempfile.TemporaryDirectory(prefix="feelahead-") as folder, StopSignal() as stop:
                 for text in unused_clauses(settings.link_spec(), _SENT):
                     status.note(text)
-                recorder = None if settings.record is None else Recorder(settings.record, Path(folder) / "recorder")
+                recorder = (
+                    None if settings.record is None else RecorderProcess(settings.record, Path(folder) / "recorder")
+                )
                 summaries = {side: Path(folder) / f"{side}.json" for side in ("robot", "operator")}
                 page = KeptPage(Path(folder)) if settings.has_pages and settings.record is None else None
                 with contextlib.suppress(BrokenPipeError):

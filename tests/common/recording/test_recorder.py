@@ -12,7 +12,7 @@ from common.errors import ConfigurationError
 from common.recording.entries import Kind, entry, unpack_block
 from common.recording.reading import open_recording
 from common.recording.recorder import FLUSH_PERIOD_S
-from common.recording.side import Recorder, SideRecording
+from common.recording.side import RecorderProcess, SideRecording
 from tests.helpers.machines.waiting import LIMIT_S
 
 pytestmark = pytest.mark.processes
@@ -106,7 +106,7 @@ def test_a_deleted_file_stops_the_recording_and_nothing_is_said_to_be_kept(tmp_p
 
 def test_two_sides_share_one_file(tmp_path: Path) -> None:
     path, place = tmp_path / "run.mcap", tmp_path / "recorder"
-    recorder = Recorder(path, place)
+    recorder = RecorderProcess(path, place)
     robot, operator = recording_to(place), recording_to(place, "operator")
     counts = [note_until(one, lambda one=one: kept_s(one) > 0.0)[0] for one in (robot, operator)]  # type: ignore[misc]
     assert operator.close()["error"] is None
@@ -125,7 +125,7 @@ def test_two_sides_share_one_file(tmp_path: Path) -> None:
 
 def test_a_recorder_of_two_sides_that_was_killed_is_told_with_what_it_kept(tmp_path: Path) -> None:
     path, place = tmp_path / "run.mcap", tmp_path / "recorder"
-    recorder = Recorder(path, place)
+    recorder = RecorderProcess(path, place)
     robot = recording_to(place)
     note_until(robot, lambda: kept_s(robot) > FLUSH_PERIOD_S)
     os.kill(recorder.process_id, signal.SIGKILL)

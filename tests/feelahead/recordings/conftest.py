@@ -43,8 +43,8 @@ def record_loopback(
     notes: dict[str, list[Any]] = {"robot": [], "operator": []}
     run = Loopback(
         LoopbackSettings(robot, operator),
-        listeners=[robot_recorded.Recorder(notes["robot"].append)],
-        operator_listeners=[operator_recorded.Recorder(notes["operator"].append)],
+        listeners=[robot_recorded.RobotRecorder(notes["robot"].append)],
+        operator_listeners=[operator_recorded.OperatorRecorder(notes["operator"].append)],
     )
     file = RecordingFile(path, WALL_OFFSET_S)
     content = Content(file)
