@@ -94,6 +94,9 @@ class Loop:
         return {
             "duration_s": self.clock.now() - self.start_s,
             "machine": {side: self._period.summary()},
-            "pacing": {side: self.pacer.summary() | {"garbage": self._collection.summary()}},
+            "pacing": {
+                side: self.pacer.summary()
+                | {"turn_cpu_us": self._period.turn_cpu_us(), "garbage": self._collection.summary()}
+            },
             "loaded_late": {side: self._loaded_late},
         }

@@ -9,8 +9,9 @@ from common.clock import Clock
 from common.statistics import RunningStatistics
 
 SPIN_S = 200e-6
-"""Duration of the busy loop before each deadline, in seconds. A sleep ends 70 us late on average, and one in twenty
-300 us late. A busy loop ends 0.1 us late, but takes a twentieth of a core with turns of 4 ms."""
+"""Duration of the busy loop before a message is released, in seconds. A sleep ends 70 us late on average, and one in
+twenty 300 us late, which is nothing to a turn. A busy loop ends 0.1 us late, but before each turn of 4 ms it would take
+a twentieth of a core."""
 
 _SHORTEST_SLEEP_S = 1e-6
 _MOST_CHANGES = 100
@@ -103,9 +104,11 @@ def wait_for_turn(
     """Wait until a message arrives, or until the pacer's deadline or `other_s`, whichever is earlier.
 
     Return whether a message arrived. `wait(timeout_s)` waits for a message and returns whether there is one; it may
-    return early. For the last `spin_s` it is called with a timeout of 0 in a busy loop, so that the turn is in time.
+    return early. For the last `spin_s` before `other_s`, when an emulated link releases a message, it is called with a
+    timeout of 0 in a busy loop, so that the message is in time.
     """
     due_s = pacer.deadline_s if other_s is None else min(pacer.deadline_s, other_s)
+    spin_s = spin_s if due_s == other_s else 0.0
     while (asleep_s := due_s - spin_s - clock.now()) > _SHORTEST_SLEEP_S:
         if wait(asleep_s):
             return True

@@ -8,6 +8,7 @@ from common.periods import period_text
 from common.realtime.pacing import Pacer
 from common.realtime.period_choice import PeriodChoice
 from common.realtime.stolen_time import StolenTime, read_stolen_time
+from common.statistics import RunningStatistics, microseconds
 
 _FULL: Final = 0.8
 """Mean computing time of a turn, as a share of the period, from which on the machine counts as too slow."""
@@ -33,9 +34,10 @@ class PeriodMonitor:
         """First sentence about a period that was not kept; None before."""
         self._pacer, self._wall, self._processor, self._remedy, self._taken = pacer, wall, processor, remedy, taken
         self._choice = PeriodChoice(pacer.period_s)
+        self._computing = RunningStatistics()
         self._began_s = self._computed_s = 0.0
-        self._turn_s = 0.0
-        """Wall time of the loop's work since the last turn, without waiting"""
+        self._turn_s, self._turn_computed_s = 0.0, 0.0
+        """Wall time and processor time of the loop's work since the last turn, without waiting"""
         self._worked_s = [0.0, 0.0]
         """Wall time and processor time of the loop's work in this window"""
         self._first: tuple[float, StolenTime] | None = None
@@ -52,23 +54,28 @@ class PeriodMonitor:
         """
         now_s = self._wall.now()
         self._turn_s += now_s - self._began_s
-        self._worked_s[0] += now_s - self._began_s
-        self._worked_s[1] += self._processor.now() - self._computed_s
+        self._turn_computed_s += self._processor.now() - self._computed_s
         if not turned:
             return None
+        self._worked_s[0] += self._turn_s
+        self._worked_s[1] += self._turn_computed_s
+        self._computing.add(self._turn_computed_s)
+        worked_s, self._turn_s, self._turn_computed_s = self._turn_s, 0.0, 0.0
         pacer, choice = self._pacer, self._choice
         if self._window is None:
             self._window = now_s, self._taken(), pacer.turns - 1
             self._first = self._window[:2]
-        judged = choice.turned(pacer.late_s, self._turn_s, pacer.missed, now_s)
-        self._turn_s = 0.0
-        if not judged:
+        if not choice.turned(pacer.late_s, worked_s, pacer.missed, now_s):
             return None
         taken, before = self._taken(), self._window
         said = self._judge(now_s, taken, *before)
         self._window = now_s, taken, pacer.turns
         self._worked_s = [0.0, 0.0]
         return said
+
+    def turn_cpu_us(self) -> dict[str, float | None]:
+        """Return `p50`, `p99` and `max` of the processor time of all work from turn to turn, in microseconds."""
+        return microseconds(self._computing)
 
     def summary(self) -> dict[str, Any]:
         """Return `said`, and the shares of time that other programs (`waited`) and the host (`stolen`) took."""

@@ -89,6 +89,7 @@ bench = Menu(
         "felt": "robot,operator,experiments",
         "link": "robot,operator",
         "tick": "robot,operator",
+        "turn": "robot,operator",
     },
 )
 try_out = Menu(

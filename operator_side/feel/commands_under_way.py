@@ -79,11 +79,6 @@ class Course(NamedTuple):
     changes_s: FloatArray
     """(n, 5) K: time that each joint takes to full travel of R2, and to full deflection of each stick's axis"""
 
-    def turned_back(self) -> "Course":
-        """Return the same course along the opposite direction, in which L2 moves the gripper."""
-        changes_s = self.changes_s * [-1.0, 1.0, 1.0, 1.0, 1.0]
-        return self._replace(displacements_m=-self.displacements_m, speed_m_s=-self.speed_m_s, changes_s=changes_s)
-
 
 class CommandsUnderWay:
     """History of our commands, and the motion of the arm as it will follow them.

@@ -7,16 +7,16 @@ them released. A zone has full strength if either path exceeds the contact dista
 """
 
 from bisect import bisect_right
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Final, NamedTuple
 
 import numpy as np
 
-from common.arrays import FloatArray, IntArray
+from common.arrays import BoolArray, FloatArray, IntArray
 from common.protocol.around import ACROSS, DIRECTIONS, TURNED, Around
 from common.protocol.messages import TriggerField
 from common.touch_speed import touch_speed_m_s
-from operator_side.controller.feel import MAX_STRENGTH
+from operator_side.controller.feel import MAX_STRENGTH, Strengths
 from operator_side.feel.commands_under_way import AT_REST, Course, Sticks
 from operator_side.feel.zones import FREE, Zones
 
@@ -47,98 +47,115 @@ class CourseOnMap(NamedTuple):
     sticks: Sticks
     """Deflections that are commanded now"""
 
-    def onsets_m(self, *, advancing: bool) -> FloatArray:
-        """Return one trigger's contact distances (2, PROBES): a row for fast zones and a row for slow ones.
 
-        advancing: for the trigger that moves the gripper forward.
-        """
-        return self.around.onsets_m(self.horizon_m)[slice(0, 2) if advancing else slice(2, 4)]
+class Asked(NamedTuple):
+    """One trigger, for `traced_zones`."""
+
+    field: TriggerField
+    travels: Sequence[float]
+    """Calibrated travel at the middle of each zone"""
+    other_travel: float
+    """Calibrated travel of the other trigger"""
+    forth: bool
+    """Whether this trigger moves the gripper forward"""
 
 
-def traced_zones(
-    aside: CourseOnMap,
-    field: TriggerField,
-    travels: Sequence[float],
-    other_travel: float,
-    horizon_s: float,
-    *,
-    forth: bool,
-) -> Zones:
-    """Compute the strengths of the zones: full where a zone's path meets something.
+class _Part(NamedTuple):
+    """Rows of one trigger's zones that command a motion, all with the same sticks."""
 
-    Within 10 mm before that, strengths rise as the onset distances of `field` do. Each zone has two paths: with the
-    sticks as they are, and with the sticks released now; the stiffer result counts. travels: calibrated travel at the
-    middle of each zone. forth: whether this trigger moves the gripper forward.
+    asked: int
+    """Index of the trigger"""
+    first: int
+    """First of these zones"""
+    rows: slice
+
+
+def traced_zones(aside: CourseOnMap, asked: Sequence[Asked], horizon_s: float) -> list[Zones]:
+    """Compute the strengths of each trigger's zones: full where a zone's path meets something.
+
+    Within 10 mm before that, strengths rise as the onset distances of the field do. Each zone has two paths: with the
+    sticks as they are, and with the sticks released now; the stiffer result counts. All paths are computed together,
+    as most of the time is spent in calls of NumPy.
     """
-    where = field, travels, other_travel, horizon_s
-    goes_on = _traced(aside, *where, forth=forth)
-    if aside.sticks == AT_REST:
-        return goes_on
-    return goes_on.at_least(_traced(aside._replace(sticks=AT_REST), *where, forth=forth), MAX_STRENGTH)
-
-
-def _traced(
-    aside: CourseOnMap,
-    field: TriggerField,
-    travels: Sequence[float],
-    other_travel: float,
-    horizon_s: float,
-    *,
-    forth: bool,
-) -> Zones:
-    course = aside.course if forth else aside.course.turned_back()
-    full_m_s = field.full_speed_m_s
-    speeds_m_s = (np.array(travels) - other_travel) * full_m_s
-    first = int(np.searchsorted(speeds_m_s, 0.0, side="right"))
-    if first == len(travels):
-        return FREE
+    found, course = [FREE] * len(asked), aside.course
+    parts, speeds, held = list[_Part](), list[FloatArray](), list[Sticks]()
+    for place, one in enumerate(asked):
+        speeds_m_s = (np.array(one.travels) - one.other_travel) * one.field.full_speed_m_s
+        first = int(np.searchsorted(speeds_m_s, 0.0, side="right"))
+        for sticks in dict.fromkeys((aside.sticks, AT_REST)) if first < len(speeds_m_s) else ():
+            parts.append(_Part(place, first, slice(len(held), len(held) + len(speeds_m_s) - first)))
+            speeds.append(speeds_m_s[first:])
+            held += [sticks] * (len(speeds_m_s) - first)
+    if not parts:
+        return found
+    # From here on one row for each zone and sticks.
+    full_m_s, signs = np.empty((len(held), 1)), np.empty((len(held), 1))
+    slow: BoolArray = np.zeros(len(held), dtype=bool)
+    for part, speeds_m_s in zip(parts, speeds, strict=True):
+        one = asked[part.asked]
+        full_m_s[part.rows], signs[part.rows] = one.field.full_speed_m_s, 1.0 if one.forth else -1.0
+        slow[part.rows] = speeds_m_s < touch_speed_m_s(one.field.full_speed_m_s)
+        slow[part.rows.start] = True
     # In order, so that np.unique is not needed: its first call loads a part of NumPy, which takes longer than a turn.
     some = np.linspace(0, len(course.displacements_m) - 1, _UNDER_WAY).astype(np.int64)
     some = some[np.diff(some, prepend=-1) > 0]
-    speeds_m_s, here_s = speeds_m_s[first:, None], course.aside_s[some]
-    ahead_m, ahead_s = _ahead(course, speeds_m_s, aside.sticks, full_m_s, horizon_s)
-    points = np.concatenate([here_s, ahead_s.reshape(-1, 4)]) / aside.around.full_s
-    free_m = contact_distances_m(aside.onsets_m(advancing=forth), points)
-    # From here on one row for each zone: displacement along its path, and the contact distances there.
-    slow = speeds_m_s < touch_speed_m_s(full_m_s)
-    slow[0] = True
-    count, zones = len(some), len(speeds_m_s)
-    under_way_m = np.where(slow, free_m[1, :count], free_m[0, :count])
-    then_m = np.where(slow, free_m[1, count:].reshape(zones, -1), free_m[0, count:].reshape(zones, -1))
-    free_m = np.hstack([under_way_m, then_m])
-    known_m = np.broadcast_to(course.displacements_m[some[1:]], (zones, count - 1))
-    path_m = np.hstack([known_m, ahead_m])
+    ahead_m, ahead_s = _ahead(course, signs, np.concatenate(speeds)[:, None], np.array(held), full_m_s, horizon_s)
+    points = np.concatenate([course.aside_s[some], ahead_s.reshape(-1, 4)]) / aside.around.full_s
+    free_m = contact_distances_m(aside.around.onsets_m(aside.horizon_m), points)
+    # Lists of the map: R2's for fast zones and for slow ones, then L2's.
+    lists, count = np.where(signs[:, 0] > 0.0, 0, 2) + slow, len(some)
+    then_m = free_m[:, count:].reshape(len(free_m), len(held), -1)[lists, np.arange(len(held))]
+    free_m = np.hstack([free_m[lists, :count], then_m])
+    path_m = np.hstack([signs * course.displacements_m[some[1:]], ahead_m])
     # Between two points the shorter contact distance counts.
-    short_m = (path_m - np.minimum(free_m[:, :-1], free_m[:, 1:])).max(axis=1).tolist()
-    found = [0] * first
-    for of_slow, beyond_m in zip(slow[:, 0].tolist(), short_m, strict=True):
+    short_m = (path_m - np.minimum(free_m[:, :-1], free_m[:, 1:])).max(axis=1)
+    beyond = path_m[:, -1] > aside.horizon_m
+    for part in parts:
+        of_part = zip(slow[part.rows].tolist(), short_m[part.rows].tolist(), strict=True)
+        strengths = _strengths(asked[part.asked].field, part.first, of_part)
+        zones = Zones(strengths, int(beyond[part.rows].sum())) if any(strengths) else FREE
+        found[part.asked] = zones.at_least(found[part.asked], MAX_STRENGTH)
+    return found
+
+
+def _strengths(field: TriggerField, first: int, found: Iterable[tuple[bool, float]]) -> Strengths:
+    """Return the strengths of the zones; found: for each from `first` on, whether it is slow, and its excess in m."""
+    strengths = [0] * first
+    for of_slow, beyond_m in found:
         onsets = field.slow_m if of_slow else field.fast_m
         weaker = bisect_right(onsets, onsets[-1] + beyond_m) if beyond_m > -_RISES_M else 0
         strength = MAX_STRENGTH if beyond_m >= 0.0 else weaker
-        found.append(max(found[-1] if found else 0, strength))
-    return Zones(tuple(found), int((path_m[:, -1] > aside.horizon_m).sum())) if any(found) else FREE
+        strengths.append(max(strengths[-1] if strengths else 0, strength))
+    return tuple(strengths)
 
 
 def _ahead(
-    course: Course, speeds_m_s: FloatArray, sticks: Sticks, full_m_s: float, horizon_s: float
+    course: Course,
+    signs: FloatArray,
+    speeds_m_s: FloatArray,
+    sticks: FloatArray,
+    full_m_s: FloatArray,
+    horizon_s: float,
 ) -> tuple[FloatArray, FloatArray]:
-    """Continue from the course's end at each zone's speed (z, 1) for one reaction, then brake; `sticks` stay.
+    """Continue from the course's end at each row's speed (z, 1) for one reaction, then brake; sticks (z, 4) stay.
 
-    Return, at k = _AHEAD times until standstill, the displacements (z, k) and the displacements by the sticks' axes
-    (z, k, 4), as in Course. Gives the same as two calls of `common.following.follow_together`.
+    signs (z, 1): 1 along the course's direction, -1 in the opposite one. full_m_s (z, 1): speed at full travel. Return,
+    at k = _AHEAD times until standstill, the displacements (z, k) along the row's direction and the displacements by
+    the sticks' axes (z, k, 4), as in Course. Gives the same as two calls of `common.following.follow_together`.
     """
-    followed = np.array([course.speed_m_s / full_m_s, *course.followed])
-    targets = np.hstack([speeds_m_s / full_m_s, np.tile(sticks, (len(speeds_m_s), 1))])
+    followed = np.hstack([signs * course.speed_m_s / full_m_s, np.broadcast_to(course.followed, sticks.shape)])
+    targets = np.hstack([speeds_m_s / full_m_s, sticks])
+    along = np.hstack([signs, np.ones(sticks.shape)])
     change = targets - followed
-    changing_s = np.abs(change @ course.changes_s.T).max(axis=1, keepdims=True)
+    changing_s = np.abs((along * change) @ course.changes_s.T).max(axis=1, keepdims=True)
     then = followed + change * np.minimum(horizon_s / np.maximum(changing_s, _LEAST_S), 1.0)
     braking = np.hstack([np.zeros_like(speeds_m_s), targets[:, 1:]]) - then
-    braking_s = np.abs(braking @ course.changes_s.T).max(axis=1, keepdims=True)
+    braking_s = np.abs((along * braking) @ course.changes_s.T).max(axis=1, keepdims=True)
     after_s = np.arange(1, _AHEAD + 1) / _AHEAD * (horizon_s + braking_s)
     going_s, since_s = np.minimum(after_s, horizon_s), np.maximum(after_s - horizon_s, 0.0)
-    passed = followed * going_s[..., None] + change[:, None] * _counts_s(going_s, changing_s)[..., None]
+    passed = followed[:, None] * going_s[..., None] + change[:, None] * _counts_s(going_s, changing_s)[..., None]
     passed += then[:, None] * since_s[..., None] + braking[:, None] * _counts_s(since_s, braking_s)[..., None]
-    return course.displacements_m[-1] + full_m_s * passed[..., 0], course.aside_s[-1] + passed[..., 1:]
+    return signs * course.displacements_m[-1] + full_m_s * passed[..., 0], course.aside_s[-1] + passed[..., 1:]
 
 
 def _counts_s(after_s: FloatArray, changing_s: FloatArray) -> FloatArray:

@@ -25,8 +25,8 @@ from operator_side.controller.feel import (
     Strengths,
 )
 from operator_side.feel.commands_under_way import Displacement
-from operator_side.feel.path_ahead import CourseOnMap, traced_zones
-from operator_side.feel.zones import FREE, moving_along, zone_strengths, zone_travels
+from operator_side.feel.path_ahead import Asked, CourseOnMap, traced_zones
+from operator_side.feel.zones import FREE, Zones, moving_along, zone_strengths, zone_travels
 from operator_side.hands.travel_calibration import TravelCalibration, TriggerTravel
 
 FALL_S: Final = 0.1
@@ -63,13 +63,12 @@ class RenderedTrigger:
         self.scale(1.0)
         self._levels = [0.0] * ZONE_COUNT
         self._last_s = -math.inf
-        self._zones = FREE
         self._strengths = FREE_TRIGGER
 
     def scale(self, speed_scale: float) -> None:
         """Render for commands that are travel times `speed_scale` from now on."""
-        self._travels = tuple(speed_scale * travel for travel in zone_travels(self._travel))
-        self._traced: CourseOnMap | None = None
+        self.travels = tuple(speed_scale * travel for travel in zone_travels(self._travel))
+        """Calibrated travel at the middle of each zone, times the speed scale"""
 
     def render(
         self,
@@ -78,23 +77,17 @@ class RenderedTrigger:
         other_travel: float,
         moving: Displacement,
         now_s: float,
-        aside: CourseOnMap | None = None,
-        *,
-        forth: bool = True,
+        traced: Zones | None = None,
     ) -> Strengths:
-        """Return the strengths at `now_s`, by `traced_zones` if there is a course on a map, else by `zone_strengths`.
+        """Return the strengths at `now_s`: those of `traced_zones` if there are any, else by `zone_strengths`.
 
-        The other arguments are those of these two functions.
+        The other arguments are those of `zone_strengths`.
         """
-        horizon_s = self._settings.horizon_s
-        zones = zone_strengths(field, horizon_m, self._travels, other_travel, moving, horizon_s)
-        if aside is not None:
-            if aside is not self._traced:
-                self._traced = aside
-                self._zones = traced_zones(aside, field, self._travels, other_travel, horizon_s, forth=forth)
+        zones = zone_strengths(field, horizon_m, self.travels, other_travel, moving, self._settings.horizon_s)
+        if traced is not None:
             # A map has only the onset of full strength, so an object to be touched is felt straight ahead only.
             touched = field.slow_m[-1] > field.fast_m[-1]
-            zones = self._zones.at_least(zones, _TOUCHED) if touched else self._zones
+            zones = traced.at_least(zones, _TOUCHED) if touched else traced
         self.beyond_horizon += zones.beyond_horizon
         if zones is FREE and not any(self._levels):
             self._last_s = now_s
@@ -140,14 +133,16 @@ class TriggerRendering:
         """swap_sides: render the robot side's L2 on the controller's R2, and its R2 on the controller's L2."""
         self.l2 = RenderedTrigger(settings, calibration.l2)
         self.r2 = RenderedTrigger(settings, calibration.r2)
-        self._swap_sides = swap_sides
+        self._settings, self._swap_sides = settings, swap_sides
+        self._traced: CourseOnMap | None = None
+        self._zones: list[Zones] = []
         self._stands = self._hindered = False
         self._pulses, self._pulsed_s = STANDS, -math.inf
         self._scale = 1.0
 
     def scale(self, speed_scale: float) -> None:
         """Render for commands that are travel times `speed_scale` from now on."""
-        self._scale = speed_scale
+        self._scale, self._traced = speed_scale, None
         for trigger in (self.l2, self.r2):
             trigger.scale(speed_scale)
 
@@ -170,10 +165,18 @@ class TriggerRendering:
             self.r2.release()
             return RELEASED
         retreating, advancing = (self.r2, self.l2) if self._swap_sides else (self.l2, self.r2)
-        (back, forth), scale = moving_along(update, known), self._scale
+        back, forth = moving_along(update, known)
+        behind, ahead = (self._scale * travel for travel in pulled)
+        if aside is not None and aside is not self._traced:
+            asked = (
+                Asked(update.l2, retreating.travels, ahead, forth=False),
+                Asked(update.r2, advancing.travels, behind, forth=True),
+            )
+            self._traced, self._zones = aside, traced_zones(aside, asked, self._settings.horizon_s)
+        traced = (None, None) if aside is None else self._zones
         strengths = (
-            retreating.render(update.l2, update.horizon_m, scale * pulled[1], back, now_s, aside, forth=False),
-            advancing.render(update.r2, update.horizon_m, scale * pulled[0], forth, now_s, aside),
+            retreating.render(update.l2, update.horizon_m, ahead, back, now_s, traced[0]),
+            advancing.render(update.r2, update.horizon_m, behind, forth, now_s, traced[1]),
         )
         l2, r2 = reversed(strengths) if self._swap_sides else strengths
         if update.stands and not self._stands:

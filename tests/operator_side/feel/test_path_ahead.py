@@ -16,7 +16,7 @@ from operator_side.controller.feel import ZONE_COUNT
 from operator_side.feel.blindness import Blindness
 from operator_side.feel.commands_under_way import AT_REST, CommandsUnderWay, Course, Report, Sticks
 from operator_side.feel.haptics import MAP_EXPIRES_S, Haptics
-from operator_side.feel.path_ahead import CourseOnMap, _ahead, contact_distances_m, traced_zones
+from operator_side.feel.path_ahead import Asked, CourseOnMap, _ahead, contact_distances_m, traced_zones
 from operator_side.feel.rendering import RenderingSettings
 from operator_side.feel.zones import zone_travels
 from operator_side.hands.travel_calibration import TravelCalibration, TriggerTravel
@@ -58,7 +58,7 @@ def first_zone(
     if course is None:
         return ZONE_COUNT
     aside = CourseOnMap(commanded, HORIZON_M, course, commands.sticks_at(now_s))
-    strengths = traced_zones(aside, FIELD, TRAVELS, 0.0, HORIZON_S, forth=forth).strengths
+    strengths = traced_zones(aside, [Asked(FIELD, TRAVELS, 0.0, forth)], HORIZON_S)[0].strengths
     return sum(strength < 8 for strength in strengths)
 
 
@@ -89,7 +89,7 @@ def test_strength_rises_before_full_as_it_does_straight_ahead_and_no_farther() -
         assert course is not None
         aside = CourseOnMap(commanded, HORIZON_M, course, RIGHT)
         along = msgspec.structs.replace(FIELD, fast_m=field, slow_m=field)
-        strengths = traced_zones(aside, along, TRAVELS, 0.0, HORIZON_S, forth=True).strengths
+        strengths = traced_zones(aside, [Asked(along, TRAVELS, 0.0, forth=True)], HORIZON_S)[0].strengths
         assert strengths[0] == 0
         assert 0 < strengths[-1] < 8
         assert list(strengths) == sorted(strengths)
@@ -126,14 +126,26 @@ def test_ways_are_interpolated_between_probes_and_never_beyond_them(onsets: list
     assert (between <= onsets_m.max() + 1e-12).all()
 
 
-@given(st.floats(-0.3, 0.3), st.floats(-1.0, 1.0), st.floats(-1.0, 1.0), st.floats(0.01, 0.25), st.integers(0, 99))
-def test_ways_ahead_are_those_of_the_arms_model(speed: float, was: float, stick: float, zone: float, seed: int) -> None:
+@given(
+    st.floats(-0.3, 0.3),
+    st.floats(-1.0, 1.0),
+    st.floats(-1.0, 1.0),
+    st.floats(0.01, 0.25),
+    st.integers(0, 99),
+    st.sampled_from([1.0, -1.0]),
+)
+def test_ways_ahead_are_those_of_the_arms_model(
+    speed: float, was: float, stick: float, zone: float, seed: int, sign: float
+) -> None:
     changes_s = np.random.default_rng(seed).uniform(-0.1, 0.1, (6, AXES))
     course = Course(np.array([0.01]), speed, np.zeros((1, 4)), np.array([was, 0.0, 0.0, 0.0]), changes_s)
-    onsets_m, aside_s = _ahead(course, np.array([[zone]]), (stick, 0.0, 0.0, 0.0), 0.25, HORIZON_S)
+    along = {"signs": np.array([[sign]]), "full_m_s": np.array([[0.25]])}
+    onsets_m, aside_s = _ahead(
+        course, speeds_m_s=np.array([[zone]]), sticks=np.array([[stick, 0.0, 0.0, 0.0]]), horizon_s=HORIZON_S, **along
+    )
     began, going, rests = (
         np.array([travel, at, 0.0, 0.0, 0.0])
-        for travel, at in ((speed / 0.25, was), (zone / 0.25, stick), (0.0, stick))
+        for travel, at in ((speed / 0.25, was), (sign * zone / 0.25, stick), (0.0, stick))
     )
     first, then = follow_together(began, going, changes_s, HORIZON_S)
     braking_s = float(np.abs(changes_s @ (rests - then)).max())
@@ -142,7 +154,7 @@ def test_ways_ahead_are_those_of_the_arms_model(speed: float, was: float, stick:
         passed = follow_together(began, going, changes_s, min(after_s, HORIZON_S))[0]
         if after_s > HORIZON_S:
             passed = first + follow_together(then, rests, changes_s, after_s - HORIZON_S)[0]
-        assert onsets_m[0, k] == pytest.approx(0.01 + 0.25 * passed[0], abs=1e-9)
+        assert onsets_m[0, k] == pytest.approx(sign * (0.01 + 0.25 * passed[0]), abs=1e-9)
         np.testing.assert_allclose(aside_s[0, k], passed[1:], atol=1e-9)
 
 

@@ -3,6 +3,7 @@
 import itertools
 from pathlib import Path
 
+import mujoco  # type: ignore[import-untyped]
 import numpy as np
 import pytest
 
@@ -51,3 +52,17 @@ def test_what_is_near_follows_the_roles(tmp_path: Path) -> None:
     assert alone.min_obstacle_distance_m is None
     assert alone.target is not None
     np.testing.assert_allclose(alone.target.position_m, np.zeros(3), atol=1e-12)
+
+
+def test_a_world_that_moves_is_observed_anew_and_one_that_rests_is_not() -> None:
+    scene = load_scene()
+    truth, robot = GroundTruth(scene), scene.robot
+    assert truth.observe() is truth.observe()
+    for moved in (1e-3, 1e-3, -2e-3):
+        scene.data.qpos[robot.arm_positions[0]] += moved
+        mujoco.mj_forward(scene.model, scene.data)
+        assert truth.observe().min_distance_m == GroundTruth(scene).observe().min_distance_m
+    crept = truth.observe()
+    for _ in range(20):
+        scene.data.qpos[robot.arm_positions[0]] += 1e-7
+    assert truth.observe() is not crept
