@@ -173,10 +173,13 @@ def contact_distances_m(onsets_m: FloatArray, aside: FloatArray) -> FloatArray:
     """
     sides_m = onsets_m[:, 1:].reshape(-1, DIRECTIONS, ACROSS + TURNED)
     here_m = np.broadcast_to(onsets_m[:, :1, None], (len(onsets_m), DIRECTIONS, 1))
-    across_m, turned_m = (np.dstack([here_m, part]) for part in (sides_m[..., :ACROSS], sides_m[..., ACROSS:]))
     moves, turns = (np.abs(aside[:, part]).max(axis=1) > _LEFT_OUT for part in (_ACROSS, _TURNED))
-    across_m = _between(across_m, aside[:, _ACROSS], linear=False)
-    turned_m = _between(turned_m, aside[:, _TURNED], linear=True)
+    across_m: FloatArray = np.broadcast_to(onsets_m[:, :1], (len(onsets_m), len(aside)))
+    if moves.any():
+        across_m = _between(np.dstack([here_m, sides_m[..., :ACROSS]]), aside[:, _ACROSS], linear=False)
+    if not turns.any():
+        return across_m
+    turned_m = _between(np.dstack([here_m, sides_m[..., ACROSS:]]), aside[:, _TURNED], linear=True)
     return np.where(turns & ~moves, turned_m, np.where(turns, np.minimum(across_m, turned_m), across_m))
 
 
