@@ -26,7 +26,7 @@ gripper"""
 _SELDOM: Final = 4.0
 """Period of a probe's looks along the trigger against which the gripper moves, in periods of the other trigger's"""
 _HOLDS_S: Final = 1.5
-"""Age at which a probe's look expires while something moves. It is long because looks from probes come late if turns
+"""Age at which a probe's look expires while something moves. It is long because looks from probes come late if ticks
 are rare."""
 _SAME_TIME: Final = 0.05
 """Largest relative change of T, the time until the arm stands, after which the probes' looks still count"""
@@ -58,8 +58,8 @@ class ProbeLooks:
     """Time from which on looks count; infinite while none does"""
     _moved_s: float = -math.inf
     """When anything last moved"""
-    _turned_s: float = -math.inf
-    """Time of the last turn"""
+    _now_s: float = -math.inf
+    """Time of the newest tick"""
     _at_s: FloatArray = field(default_factory=lambda: np.full((2, PROBES), -np.inf))
     _direction: FloatArray = field(default_factory=lambda: np.zeros((2, PROBES, 3)))
     _began_m: FloatArray = field(default_factory=lambda: np.zeros((2, PROBES)))
@@ -70,12 +70,12 @@ class ProbeLooks:
         """Discard all looks, because the objects' classes or P have changed."""
         self._since_s = math.inf
 
-    def turn(self, until_s: float, now_s: float, *, traced: bool, moved: bool) -> None:
-        """Begin a turn. Discard the looks if T has changed to another `until_s`.
+    def begin(self, until_s: float, now_s: float, *, traced: bool, moved: bool) -> None:
+        """Begin a tick. Discard the looks if T has changed to another `until_s`.
 
         traced: whether the operator side traces the map; if not, no look counts. moved: whether anything moves.
         """
-        self._turned_s = now_s
+        self._now_s = now_s
         if not traced:
             self._since_s = math.inf
         elif self._since_s == math.inf or abs(until_s - self.full_s) > _SAME_TIME * self.full_s:
@@ -86,7 +86,7 @@ class ProbeLooks:
     @property
     def known(self) -> bool:
         """Whether the map is valid: all looks count, and are recent or made since the last motion."""
-        old = (self._at_s <= self._moved_s) & (self._at_s < self._turned_s - _HOLDS_S)
+        old = (self._at_s <= self._moved_s) & (self._at_s < self._now_s - _HOLDS_S)
         return bool(((self._at_s >= self._since_s) & ~old).all()) and 0.0 < self.full_s <= LONGEST_S
 
     def due(self, motion: GripperMotion, passed_s: float) -> list[tuple[int, int]]:
@@ -94,7 +94,7 @@ class ProbeLooks:
         if self._since_s == math.inf:
             return []
         leads = np.array([[motion.ahead_m_s > -_RETREATS_M_S], [motion.ahead_m_s < _RETREATS_M_S]])
-        waited = (self._turned_s - self._at_s) / np.where(leads, PERIOD_S, _SELDOM * PERIOD_S)
+        waited = (self._now_s - self._at_s) / np.where(leads, PERIOD_S, _SELDOM * PERIOD_S)
         waited[self._at_s > self._moved_s] = -np.inf
         # A discarded look is due again at once: until then the operator side has the old map.
         waited[self._at_s < self._since_s] = np.inf
@@ -103,13 +103,13 @@ class ProbeLooks:
 
     def add(self, side: int, number: int, direction: FloatArray, began_m: float, onsets_m: FloatArray) -> None:
         """Store a probe's newest look. onsets_m (2, 8): fast and slow list."""
-        self._at_s[side, number], self._direction[side, number] = self._turned_s, direction
+        self._at_s[side, number], self._direction[side, number] = self._now_s, direction
         self._began_m[side, number], self._onsets_m[side, :, number] = began_m, onsets_m[:, -1]
 
     def onsets_m(self, pose: GripperPose, sensed: Sensed, velocities_m_s: FloatArray) -> FloatArray:
         """Return the map's onset distances (LISTS, PROBES) from the tool's present pose.
 
-        sensed: the turn's field. velocities_m_s (k, 3): those of the objects that are felt.
+        sensed: the tick's field. velocities_m_s (k, 3): those of the objects that are felt.
         """
         found_m = np.empty((2, 2, PROBES))
         for side, ahead in ((R2, sensed.r2), (L2, sensed.l2)):
@@ -117,7 +117,7 @@ class ProbeLooks:
             gone_m = self._direction[side] @ pose.tool_position_m - self._began_m[side]
             # A look includes the objects' motion until the gripper stops, but not their motion since the look.
             closing_m_s = max(float(-(velocities_m_s @ approach).min(initial=0.0)), 0.0)
-            gone_m += closing_m_s * (self._turned_s - self._at_s[side])
+            gone_m += closing_m_s * (self._now_s - self._at_s[side])
             found_m[side] = self._onsets_m[side] - gone_m
             # Straight ahead the present field knows more: new objects and the motion of the fingers.
             for kind, newest_m in enumerate((ahead.fast_m[-1], ahead.slow_m[-1])):

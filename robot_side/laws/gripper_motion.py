@@ -46,7 +46,7 @@ class FingerSpeeds:
     def measure(self, pose: GripperPose, now_s: float) -> FloatArray | None:
         """Return the velocity (m, 3) of each sphere relative to the tool; None while the fingers rest.
 
-        Spheres that have changed in number begin anew, at rest.
+        Spheres in another number are at rest at first.
         """
         measured = self._measured
         if measured and len(measured[-1][1]) != len(pose.sphere_centers_m):

@@ -51,7 +51,7 @@ def require_usable(situation: Situation, joints: int, now_s: float) -> None:
         if count != valid:
             raise ValueError(f"{name} = {count}; valid: {valid}, the number that the law was made for")
     arrays = pose.tool_position_m, pose.tool_rotation, pose.tool_jacobian, pose.sphere_centers_m, pose.sphere_radii_m
-    # A sum of squares is finite only if all numbers are; this takes a third of the time of np.isfinite.
+    # A sum of squares is finite only if all numbers are; this takes a third of the time that np.isfinite takes.
     squares = sum(float(np.vdot(array, array)) for array in (*arrays, rates))
     if math.isfinite(squares + sum(situation.lateral) + situation.loop_age_s + now_s):
         return

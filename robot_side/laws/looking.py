@@ -1,4 +1,4 @@
-"""Looks of one turn: along each side from the present pose, from waypoints on the path, and from the map's probes."""
+"""Looks of one tick: along each side from the present pose, from waypoints on the path, and from the map's probes."""
 
 import math
 from dataclasses import dataclass, field
@@ -30,7 +30,7 @@ _NOTHING: Final[FloatArray] = np.zeros(3)
 
 @dataclass(frozen=True)
 class Seen:
-    """What one turn looks at: the situation, and what was worked out of it."""
+    """Situation that one tick looks at, and what follows from it."""
 
     situation: Situation
     motion: GripperMotion
@@ -39,7 +39,7 @@ class Seen:
     scene: SceneTable
     now_s: float
     passed_s: float
-    """Time since the last turn that looked; infinite in the first"""
+    """Time since the last tick that looked; infinite in the first"""
 
     def prospect(self, side: int, waypoint: Waypoint | None = None) -> Prospect:
         """Return the prospect of a look along one side; without a waypoint, from the present pose."""
@@ -67,8 +67,8 @@ class Looking:
     """Counts of the looks' work, indexed by `Count`"""
     _next_overlap_s: float = -math.inf
 
-    def turn(self, seen: Seen, *, changed: bool) -> None:
-        """Make the looks of one turn. changed: whether objects or the gripper's spheres have changed or moved."""
+    def look(self, seen: Seen, *, changed: bool) -> None:
+        """Make the looks of one tick. changed: whether objects or the gripper's spheres have changed or moved."""
         situation, motion = seen.situation, seen.motion
         deflected, traced = situation.lateral != (0.0, 0.0), situation.compensation == "operator"
         for side in (R2, L2, STICK)[: 3 if deflected else 2]:
@@ -80,22 +80,22 @@ class Looking:
         on_map = traced and self.probes is not None and self.probes.known
         self._look_from_waypoints(seen, until_s, traced=on_map)
         if self.probes is not None:
-            self.probes.turn(until_s, seen.now_s, traced=traced, moved=changed or motion.moves)
+            self.probes.begin(until_s, seen.now_s, traced=traced, moved=changed or motion.moves)
             self._look_from_probes(self.probes, self.probes.due(motion, seen.passed_s), seen)
 
     def look_around(self, seen: Seen) -> None:
         """Look from all probes."""
         if self.probes is not None:
             until_s = stopping_s(seen.prospect(R2).able, seen.situation.loop_age_s)
-            self.probes.turn(until_s, seen.now_s, traced=True, moved=True)
+            self.probes.begin(until_s, seen.now_s, traced=True, moved=True)
             self._look_from_probes(self.probes, [(side, one) for side in (R2, L2) for one in range(PROBES)], seen)
 
     def _look_from_probes(self, probes: ProbeLooks, due: list[tuple[int, int]], seen: Seen) -> None:
         for side, number in due:
             there = probe(number, seen.situation.pose, seen.assumed.motion, probes.full_s)
-            probes.add(side, number, *self._look(seen.prospect(side, there), seen)[1:])
+            probes.add(side, number, *self._one(seen.prospect(side, there), seen)[1:])
 
-    def _look(self, found: Prospect, seen: Seen) -> tuple[Field, FloatArray, float, FloatArray]:
+    def _one(self, found: Prospect, seen: Seen) -> tuple[Field, FloatArray, float, FloatArray]:
         """Look; return the field, û, the tool's position along û, and the onset distances (2, 8) from the tool."""
         pose, classes, along, widest_m = found.asked
         made = self.ahead.look(pose, seen.scene, classes, along, widest_m)
@@ -108,7 +108,7 @@ class Looking:
 
     def _look_from_here(self, side: int, seen: Seen) -> None:
         found, motion = seen.prospect(side), seen.motion
-        made, direction, began_m, onsets_m = self._look(found, seen)
+        made, direction, began_m, onsets_m = self._one(found, seen)
         self.sides[side].add(0, seen.now_s, direction, began_m, onsets_m)
         self.newest[side] = Newest(direction, began_m, found.asked.along.reach_m, found.able, made.sigma_m)
         leads = side == (R2 if motion.ahead_m_s >= 0.0 else L2)
@@ -119,7 +119,7 @@ class Looking:
             self.overlap_m3 = total_overlap_m3(spheres, seen.scene, found.asked.classes)
 
     def _look_from_waypoints(self, seen: Seen, until_s: float, *, traced: bool) -> None:
-        """Look along R2 and L2 from the waypoints on the gripper's path that are new, or whose turn it is."""
+        """Look along R2 and L2 from the waypoints on the gripper's path that are new, or due."""
         pose, motion, times_s = seen.situation.pose, seen.motion, tuple[float, ...]()
         drift = Drift(_NOTHING, _NOTHING, motion.fingers_m_s)
         if not traced:
@@ -134,4 +134,4 @@ class Looking:
                 looks.keep_up_to(len(ahead))
                 for number in looks.due(seen.passed_s, seen.now_s):
                     found = seen.prospect(side, ahead[number - 1])
-                    looks.add(number, seen.now_s, *self._look(found, seen)[1:])
+                    looks.add(number, seen.now_s, *self._one(found, seen)[1:])

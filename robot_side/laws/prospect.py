@@ -35,7 +35,7 @@ class Asked(NamedTuple):
 
 @dataclass(frozen=True)
 class Prospect:
-    """What is asked of a look, what the arm can do along it, and how its onset distances count from the tool."""
+    """Arguments of a look, the arm's ability along it, and how its onset distances count from the tool."""
 
     asked: Asked
     able: Ability
@@ -51,7 +51,7 @@ class Prospect:
 
 @dataclass(frozen=True)
 class Assumed:
-    """What a law assumes: errors, the arm's limits and its speeds at full travel and deflection."""
+    """Assumptions of a law: errors, the arm's limits and its speeds at full travel and deflection."""
 
     uncertainty: Uncertainty
     limits: JointLimits

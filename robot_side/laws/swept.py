@@ -2,7 +2,7 @@
 
     motion ─▶ path ─▶ prospect: errors, ability ─▶ looks ─▶ field
 
-A look evaluates the law along one direction from one pose. Each turn looks along R2, L2, and the stick while it is
+A look evaluates the law along one direction from one pose. Each tick looks along R2, L2, and the stick while it is
 deflected; while everything rests, every 50 ms. Between looks the tool's motion is subtracted from the onset distances,
 which is exact for a translation. The shortest onset distances of the last 0.1 s count: where the gripper just passes
 an object, encoder noise alone can switch between no strength and full strength.
@@ -45,7 +45,7 @@ from robot_side.tick.sensed import L2, R2, STICK, Sensed
 from robot_side.tick.situation import Situation
 
 LOOK_PERIOD_S: Final = 0.004
-"""Least time between two turns that look: a controller is read and written no more often"""
+"""Least time between two ticks that look: a controller is read and written no more often"""
 REST_PERIOD_S: Final = 0.05
 """Period of looks while everything rests"""
 _SAME_AGE_S: Final = 0.002
@@ -79,12 +79,12 @@ class SweptLaw:
         self._touch_speed_m_s = touch_speed_m_s(motion.trigger_speed_m_s)
         self._fingers = FingerSpeeds()
         self._last: Seen | None = None
-        """The last turn that looked"""
+        """Last tick that looked"""
         self._sensed: Sensed | None = None
         self._without_looks = 0
 
     def sense(self, situation: Situation, now_s: float) -> Sensed:
-        """Return the fields and the rumble of one turn.
+        """Return the fields and the rumble of one tick.
 
         ValueError for wrong sizes and for numbers that are not finite; earlier looks then stay.
         """
@@ -94,7 +94,7 @@ class SweptLaw:
             other = last is None or last.classes is not seen.classes or last.assumed is not seen.assumed
             if other and self.looking.probes is not None:
                 self.looking.probes.discard()
-            self.looking.turn(seen, changed=last is None or _has_changed(seen, last))
+            self.looking.look(seen, changed=last is None or _has_changed(seen, last))
             self._last = seen
         else:
             self._without_looks += 1
@@ -168,7 +168,7 @@ class SweptLaw:
     def summary(self) -> dict[str, int]:
         """Return counts over the run: looks (`fields`), their work (`Count`), and what was skipped.
 
-        `without_looks`: turns in which nothing moved. `flat`: the newest scene's primitives without volume.
+        `without_looks`: ticks in which nothing moved. `flat`: the newest scene's primitives without volume.
         """
         looking = self.looking
         counts = {"fields": looking.looks} | {one.name.lower(): int(looking.work[one]) for one in Count}
@@ -192,7 +192,7 @@ class SweptLaw:
 
 
 def _is_due(seen: Seen, last: Seen) -> bool:
-    """Return whether a turn looks: something moves or has changed, or the last looks are old."""
+    """Return whether a tick looks: something moves or has changed, or the last looks are old."""
     now, then = seen.situation, last.situation
     if seen.classes is not last.classes or seen.assumed is not last.assumed:
         return True
@@ -208,7 +208,7 @@ def _is_due(seen: Seen, last: Seen) -> bool:
 
 
 def _has_changed(seen: Seen, last: Seen) -> bool:
-    """Return whether the gripper has other spheres, or objects may have moved since the last turn that looked."""
+    """Return whether the gripper has other spheres, or objects may have moved since the last tick that looked."""
     if len(seen.situation.pose.sphere_radii_m) != len(last.situation.pose.sphere_radii_m):
         return True
     objects = seen.situation.objects

@@ -1,4 +1,4 @@
-"""Result of one turn of a law: a field along each trigger, the rumble, and figures for display."""
+"""Result of one tick of a law: a field along each trigger, the rumble, and figures for display."""
 
 import math
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ STRENGTHS: Final = 8
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Sensed:
-    """Result of one turn of a law; ValueError for a figure that is not finite."""
+    """Result of one tick of a law; ValueError for a figure that is not finite."""
 
     l2: TriggerField
     """Field for L2: onset distances along its direction, with displacement, stiffness and speeds"""

@@ -198,9 +198,9 @@ def test_no_probe_starves_however_late_the_ticks_are(law: SweptLaw, step_s: floa
     assert probes is not None
     assert probes.known
     # The looks along the trigger that leads are as old as their period at most, and the others four periods.
-    probes.turn(FULL_S, now_s + 1.5 - 4.0 * PERIOD_S - 2.0 * step_s, traced=True, moved=True)
+    probes.begin(FULL_S, now_s + 1.5 - 4.0 * PERIOD_S - 2.0 * step_s, traced=True, moved=True)
     assert probes.known
-    probes.turn(FULL_S, now_s + 1.5 + step_s, traced=True, moved=True)
+    probes.begin(FULL_S, now_s + 1.5 + step_s, traced=True, moved=True)
     assert not probes.known
 
 
