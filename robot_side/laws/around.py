@@ -30,6 +30,8 @@ _HOLDS_S: Final = 1.5
 are rare."""
 _SAME_TIME: Final = 0.05
 """Largest relative change of T, the time until the arm stands, after which the probes' looks still count"""
+_ANEW_S: Final = 0.05
+"""Time in which discarded looks are made again"""
 _ROUNDING: Final = 1e-6
 
 
@@ -97,8 +99,10 @@ class ProbeLooks:
         waited = (self._now_s - self._at_s) / np.where(leads, PERIOD_S, _SELDOM * PERIOD_S)
         waited[self._at_s > self._moved_s] = -np.inf
         # A discarded look is due again at once: until then the operator side has the old map.
-        waited[self._at_s < self._since_s] = np.inf
-        first = np.argsort(-waited, axis=None, kind="stable")[: math.ceil(2.0 * PROBES * min(passed_s / PERIOD_S, 1.0))]
+        discarded = self._at_s < self._since_s
+        waited[discarded] = np.inf
+        share = min(passed_s / (_ANEW_S if discarded.any() else PERIOD_S), 1.0)
+        first = np.argsort(-waited, axis=None, kind="stable")[: math.ceil(2.0 * PROBES * share)]
         return [divmod(one, PROBES) for one in first.tolist() if waited.flat[one] >= 1.0 - _ROUNDING]
 
     def add(self, side: int, number: int, direction: FloatArray, began_m: float, onsets_m: FloatArray) -> None:
