@@ -183,15 +183,15 @@ def run(cell: Case, seed: int) -> Iterator[Row]:
             side.check()
         robot, operator = (read_summary(pair.folder / f"{name}.json") for name in ("robot", "operator"))
         delays_s = json.loads((pair.folder / "delays.json").read_text(encoding="utf-8"))
+    figures = {**_figures(robot, "robot", statuses[0]), **_figures(operator, "operator", statuses[1])}
     shares = [(later - earlier) / (ended_s - began_s) for earlier, later in zip(before, after, strict=True)]
     yield {
         "robot_share": shares[0],
         "operator_share": shares[1],
         "armed": float(np.mean([one.get("state") == "armed" for one in statuses[1]])) if statuses[1] else None,
         "stops": len(robot["stops"]),
-        **_figures(robot, "robot", statuses[0]),
-        **_figures(operator, "operator", statuses[1]),
-        "tick_p99_us": robot["tick_cpu_us"]["p99"],
+        **figures,
+        "tick_p99_of_period": 1e-3 * robot["tick_cpu_us"]["p99"] / figures["robot_period_ms"],
         "loop_age_ms": robot["loop_age_ms"]["p50"],
         "delay_p50_ms": 1e3 * float(np.quantile(delays_s, 0.5)) if delays_s else None,
         "delay_p99_ms": 1e3 * float(np.quantile(delays_s, 0.99)) if delays_s else None,
@@ -223,7 +223,7 @@ _TIMES: Final = {
     "operator_missed": "operator missed",
     "robot_p99_of_period": "turn p99 / period",
     "operator_p99_of_period": "operator p99 / period",
-    "tick_p99_us": "tick p99, us",
+    "tick_p99_of_period": "tick p99 / period",
 }
 _DELAYS: Final = {
     "delay_p50_ms": "felt after, ms",
