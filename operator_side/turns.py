@@ -8,7 +8,7 @@ from msgspec.structs import replace
 
 from common.loop.process import Process
 from common.sockets.operator import OperatorSockets
-from common.status.codes import Hands, LinkState
+from common.status.codes import InputSource, LinkState
 from common.status.statuses import OperatorStatus
 from operator_side.controller.connection import Connection
 from operator_side.core import OperatorSide
@@ -170,8 +170,8 @@ class OperatorTurns:
     def _surroundings(self, now_s: float) -> Surroundings:
         person = self._person
         page = self._pages.facts(self._core, now_s, person=person is not None and person.has_person)
-        hands = Hands.CONTROLLER if person is None else person.hands
-        return Surroundings(hands, self._sending.line.profile.words, page, self._pages.pictures.facts())
+        source = InputSource.CONTROLLER if person is None else person.source
+        return Surroundings(source, self._sending.line.profile.words, page, self._pages.pictures.facts())
 
     def _status(self, now_s: float) -> OperatorStatus:
         """Return the core's status, completed with the fields that only the process knows."""

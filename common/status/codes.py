@@ -37,7 +37,7 @@ class Sight(StrEnum):
     """A field has arrived again, but both triggers must be released before the intent counts."""
 
 
-class Hands(StrEnum):
+class InputSource(StrEnum):
     """Source of the inputs that move the arm."""
 
     CONTROLLER = "controller"

@@ -9,7 +9,7 @@ from typing import Literal
 import msgspec
 
 from common.protocol.messages import Telemetry
-from common.status.codes import Hands
+from common.status.codes import InputSource
 from common.status.statuses import OperatorStatus, RobotStatus
 
 Ten = tuple[int, int, int, int, int, int, int, int, int, int]
@@ -110,7 +110,7 @@ class OperatorFacts(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     round_trip_ms: float | None
     field_age_ms: float | None
     """Time since the newest stiffness message arrived; None before the first"""
-    hands: Hands
+    hands: InputSource
     """Owner of the controls: a controller, a scripted person or a browser"""
     may_tune: bool
     """Whether this operator may change P and the emulated link"""

@@ -6,7 +6,7 @@ from typing import Final, cast
 
 import msgspec
 
-from common.status.codes import Hands
+from common.status.codes import InputSource
 from common.status.statuses import OperatorStatus
 from operator_side.controller.feel import FREE_TRIGGER, met
 from operator_side.core import OperatorSide
@@ -27,7 +27,7 @@ _TAIL: Final = 0.99
 class Surroundings(msgspec.Struct, frozen=True):
     """Facts that the core does not have and the process adds."""
 
-    hands: Hands
+    hands: InputSource
     asked_to_robot: str = ""
     """Delay profile that this side emulates towards the robot, in netem's words"""
     page: HandsFacts | None = None

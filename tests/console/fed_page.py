@@ -11,7 +11,7 @@ from msgspec.structs import replace
 from common.clock import MonotonicClock
 from common.protocol.messages import MotionState
 from common.protocol.view_messages import VIEW_NAMES
-from common.status.codes import Hands
+from common.status.codes import InputSource
 from operator_side.viewing.console.console import Console
 from operator_side.viewing.facts import HandsFacts, PictureFacts
 from tests.console.browser import SMALL, Browser, Page
@@ -61,7 +61,7 @@ class Fed:
                     console.view(shapes(), video=False)
                 console.view(state(now_s), video=False)
                 if self.tells:
-                    told = {"hands": Hands.BROWSER, "page": page, "status": status, "pictures": self.pictures}
+                    told = {"hands": InputSource.BROWSER, "page": page, "status": status, "pictures": self.pictures}
                     console.facts(replace(made, **told))
                 for view in VIEW_NAMES if self.sends else ():
                     console.view(pictures.frame(view, now_s, step, now_s - self.age_s), video=True)

@@ -22,7 +22,7 @@ from common.protocol.view_messages import (
     VideoFrame,
     ViewName,
 )
-from common.status.codes import Doing, Hands, LinkState
+from common.status.codes import Doing, InputSource, LinkState
 from common.status.statuses import OperatorStatus
 from operator_side.viewing.console.console import Console
 from operator_side.viewing.facts import FACTS_PERIOD_S, DelayFacts, OperatorFacts, TriggerFacts
@@ -67,7 +67,7 @@ def facts(now_s: float, state: MotionState = "armed", advancing: Literal["L2", "
         to_robot=DelayFacts("delay 50ms 10ms distribution normal", 49.0, 58.0, 49.0 + 5.0 * math.cos(5.0 * now_s)),
         round_trip_ms=101.0,
         field_age_ms=1.0,
-        hands=Hands.PERSON,
+        hands=InputSource.PERSON,
         may_tune=False,
         probability=None,
     )

@@ -38,7 +38,7 @@ from common.protocol.view_messages import (
     VideoStep,
 )
 from common.roles import ROLES, Role
-from common.status.codes import Hands, Look
+from common.status.codes import InputSource, Look
 from operator_side.controller.feel import SENSED_TRAVEL
 from operator_side.viewing.facts import OperatorFacts, ShownKind
 
@@ -226,7 +226,7 @@ def said(facts: OperatorFacts) -> dict[str, Any]:
         "why": (None if state == view.phase else view.phase, view.reason),
         "link": link_words(status),
         "lease": lease_words(status.owner) or None,
-        "whose": "scripted person" if facts.hands is Hands.PERSON else words(facts.hands),
+        "whose": "scripted person" if facts.hands is InputSource.PERSON else words(facts.hands),
         "holding": None if status.holding is None else f"{view.holding or 'nothing'}{view.stands}",
     }
 

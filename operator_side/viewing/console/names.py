@@ -6,10 +6,10 @@ from typing import Final, get_args
 from common.protocol.messages import MotionState
 from common.protocol.session import SessionState
 from common.protocol.view_messages import VIEW_NAMES
-from common.status.codes import Doing, Hands, LinkState
+from common.status.codes import Doing, InputSource, LinkState
 from operator_side.viewing.facts import ShownKind
 
-_CODES: Final = (ShownKind, LinkState, SessionState, Doing, Hands)
+_CODES: Final = (ShownKind, LinkState, SessionState, Doing, InputSource)
 
 
 def names() -> str:

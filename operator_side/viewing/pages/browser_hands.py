@@ -8,7 +8,7 @@ from collections.abc import Callable
 from typing import Final
 
 from common.protocol.messages import Telemetry
-from common.status.codes import Doing, Hands
+from common.status.codes import Doing, InputSource
 from operator_side.controller.feel import FREE_TRIGGER, RELEASED, Feel
 from operator_side.controller.state import ControllerState
 from operator_side.hands.button_map import Action, button_of
@@ -56,9 +56,9 @@ class BrowserHands:
         self._ticked_s = -math.inf
 
     @property
-    def hands(self) -> Hands:
+    def source(self) -> InputSource:
         """Owner of the controls: a browser."""
-        return Hands.BROWSER
+        return InputSource.BROWSER
 
     @property
     def doing(self) -> Doing:

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 from common.protocol.messages import Telemetry
-from common.status.codes import Doing, Hands
+from common.status.codes import Doing, InputSource
 from operator_side.controller.feel import Feel
 from operator_side.controller.state import ControllerState
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
@@ -39,9 +39,9 @@ class SharedHands(BrowserHands):
         self._person: SimulatedHands | None = new_person()
 
     @property
-    def hands(self) -> Hands:
+    def source(self) -> InputSource:
         """Owner of the controls: the scripted person or a browser."""
-        return Hands.BROWSER if self._person is None else Hands.PERSON
+        return InputSource.BROWSER if self._person is None else InputSource.PERSON
 
     @property
     def doing(self) -> Doing:

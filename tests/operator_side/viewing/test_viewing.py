@@ -11,7 +11,7 @@ from common.protocol.compact import STEP_M
 from common.protocol.messages import StiffnessUpdate, TriggerField, Watch
 from common.protocol.view_messages import SCENE_TOPIC, VIDEO_TOPIC, SceneState
 from common.reaction import HORIZON_S
-from common.status.codes import Hands
+from common.status.codes import InputSource
 from operator_side.controller.feel import SENSED_TRAVEL
 from operator_side.controller.state import Button
 from operator_side.hands.travel_calibration import TriggerTravel
@@ -34,7 +34,7 @@ def field(first_m: float, displacement_m: float, stiffness: float) -> TriggerFie
 
 def facts_of(bench: Bench, surroundings: Surroundings | None = None) -> OperatorFacts:
     facts = operator_facts(
-        bench.side, bench.side.status(bench.now_s), surroundings or Surroundings(Hands.CONTROLLER), bench.now_s
+        bench.side, bench.side.status(bench.now_s), surroundings or Surroundings(InputSource.CONTROLLER), bench.now_s
     )
     assert msgspec.msgpack.decode(msgspec.msgpack.encode(facts), type=OperatorFacts) == facts
     return facts
@@ -93,7 +93,7 @@ def test_what_is_needed_is_d_at_the_present_travel_by_the_controllers_own_names(
 
 def test_delays_are_those_of_the_last_second() -> None:
     bench = felt_bench()
-    facts = facts_of(bench, Surroundings(Hands.PERSON, asked_to_robot="delay 5ms"))
+    facts = facts_of(bench, Surroundings(InputSource.PERSON, asked_to_robot="delay 5ms"))
     assert facts.offset_s == 0.0
     assert (facts.to_robot.asked, facts.hands) == ("delay 5ms", "person")
     bench.side.link.recent.clear()
@@ -145,7 +145,7 @@ class FakeConsole:
 
 def surroundings(now_s: float) -> Surroundings:
     del now_s
-    return Surroundings(Hands.PERSON)
+    return Surroundings(InputSource.PERSON)
 
 
 class Looking:

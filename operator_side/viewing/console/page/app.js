@@ -1,8 +1,8 @@
 // Main script of the page: shows the console's messages as they arrive.
 import { Chart } from "./charts.js";
-import { Hands as PageHands } from "./hands.js";
+import { Hands } from "./hands.js";
 import { make } from "./make.js";
-import { Hands, LinkState, MotionState, ShownKind, VIEWS } from "./names.js";
+import { InputSource, LinkState, MotionState, ShownKind, VIEWS } from "./names.js";
 import { Overlay } from "./overlay.js";
 import { Player } from "./player.js";
 import { Clock, View } from "./views.js";
@@ -52,7 +52,7 @@ let ended = ""; // why the connection is expected to end
 const send = (object) => {
   if (socket?.readyState === WebSocket.OPEN) socket.send(JSON.stringify(object));
 };
-const hands = new PageHands(document, send, () => views[0].capturedS);
+const hands = new Hands(document, send, () => views[0].capturedS);
 const player = new Player(byId("player"), send);
 
 function connect() {
@@ -137,7 +137,7 @@ function showFacts(message) {
 
 // The operator side lets a page's hands fade while the pictures are old.
 function showCounts({ page, hands: whose, status }) {
-  const drives = run.live && whose === Hands.BROWSER && page?.driver && status.state === MotionState.ARMED;
+  const drives = run.live && whose === InputSource.BROWSER && page?.driver && status.state === MotionState.ARMED;
   const off = drives && page.counts < 1;
   document.body.classList.toggle("hands_off", Boolean(off));
   byId("hands_off").hidden = !off;

@@ -1,7 +1,7 @@
 // Panel for driving: its texts, buttons and elements to hold.
 import { KEYS, keyWords, MARKS } from "./inputs.js";
 import { make } from "./make.js";
-import { Doing, Hands, LinkState, MotionState, SessionState } from "./names.js";
+import { Doing, InputSource, LinkState, MotionState, SessionState } from "./names.js";
 
 const FULL = "Travel of keys: 1 to 9";
 const YIELDS = "Stiff zones stop the pull of keys, as they stop a finger of 2 N";
@@ -102,7 +102,7 @@ export class Panel {
     drive.disabled = state === "watching" && (hands === null || !hands.may_drive || taken !== "");
     const may = mine || !hands?.driver; // nobody resets or hands back for another page
     reset.hidden = !(hands?.reset_first && may && !stop?.goesOn);
-    giveBack.hidden = !(hands?.person && facts.hands === Hands.BROWSER && may && !hands.reset_first);
+    giveBack.hidden = !(hands?.person && facts.hands === InputSource.BROWSER && may && !hands.reset_first);
     this.#text("state", {
       watching: [why, taken, cannot || (taken ? "" : "You are watching.")].filter(Boolean).join(" "),
       resting: [why, cannot || (hands?.reset_first ? "Reset the stop first." : "All keys up for a second.")].filter(Boolean).join(" "),

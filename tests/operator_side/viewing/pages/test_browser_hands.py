@@ -5,7 +5,7 @@ import msgspec
 import pytest
 
 from common.protocol.messages import Telemetry
-from common.status.codes import Hands
+from common.status.codes import InputSource
 from operator_side.controller.feel import SENSED_TRAVEL, Feel
 from operator_side.controller.state import Button, ControllerState
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
@@ -150,16 +150,16 @@ def test_the_person_lets_go_when_a_page_drives_and_silence_gives_nothing_back() 
     desk.let_pass(1.4, says=False)
     desk.screen = armed()
     desk.let_pass(1.0, says=False)
-    assert (desk.hands.hands, desk.hands.doing) == (Hands.PERSON, "pulling")
+    assert (desk.hands.source, desk.hands.doing) == (InputSource.PERSON, "pulling")
     assert desk.let_pass(0.004, says=False)[-1].r2 > 0.5
     after = desk.let_pass(0.1)
     assert {(one.r2, one.run) for one in after[1:]} == {(0.0, False)}
     silent = desk.let_pass(5.0, says=False)
     assert {(one.r2, one.run) for one in silent} == {(0.0, False)}
-    assert (desk.hands.hands, desk.people) == (Hands.BROWSER, 1)
+    assert (desk.hands.source, desk.people) == (InputSource.BROWSER, 1)
     desk.page.say(desk.now_s, driving=False, give_back=True)
     first = desk.let_pass(0.1, says=False)
-    assert (desk.hands.hands, desk.hands.doing, desk.people) == (Hands.PERSON, "resting", 2)
+    assert (desk.hands.source, desk.hands.doing, desk.people) == (InputSource.PERSON, "resting", 2)
     assert (first[0].r2, first[0].arm) == (0.0, False)
 
 
@@ -168,11 +168,11 @@ def test_a_stop_takes_the_controller_from_the_person_for_good() -> None:
     desk.let_pass(1.3, says=False)
     desk.page.say(desk.now_s, driving=False, stop=True)
     assert not any(one.arm for one in desk.let_pass(10.0, says=False)[1:])
-    assert desk.hands.hands == Hands.BROWSER
+    assert desk.hands.source == InputSource.BROWSER
     alone = Desk()
     alone.page.say(0.0, driving=False, give_back=True)
     assert not any(one.run for one in alone.let_pass(3.0, says=False))
-    assert (alone.hands.hands, alone.hands.has_person) == (Hands.BROWSER, False)
+    assert (alone.hands.source, alone.hands.has_person) == (InputSource.BROWSER, False)
 
 
 def test_a_stop_from_elsewhere_needs_a_reset_too_and_hold_to_run_does_not_arm_before_it() -> None:
