@@ -27,7 +27,7 @@ from operator_side.feel.blindness import Blindness
 from operator_side.feel.haptics import Haptics
 from operator_side.hands.choices import Choices
 from operator_side.hands.intent import OperatorIntent
-from operator_side.hands.newest import Hands
+from operator_side.hands.newest import NewestIntent
 from operator_side.hands.travel_calibration import TravelCalibration
 from operator_side.robot_link.commanding import HEARTBEAT_PERIOD_S, STOPPING, Commands, ToRobot
 from operator_side.robot_link.lease_state import LeaseState
@@ -54,7 +54,7 @@ class OperatorSide:
         self.screen: Telemetry | None = None
         """Newest telemetry of the robot side; None before the first."""
         choices = Choices(settings.speed_scale, settings.stick_frame)
-        self.hands = Hands(settings.calibration, choices, swap_sides=settings.swap_sides)
+        self.hands = NewestIntent(settings.calibration, choices, swap_sides=settings.swap_sides)
         self.haptics = Haptics(
             settings.rendering,
             settings.calibration,

@@ -18,7 +18,7 @@ from common.command.command_line import run_command
 from operator_side.core import OperatorSide
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.main import command
-from operator_side.people.pulling_hands import Hands, PullingHands
+from operator_side.people.pulling_hands import FingerInput, PullingHands
 
 _FORCE_N: Final = 2.0
 _CYCLE_S: Final = 3.0
@@ -28,11 +28,11 @@ _AT_ONCE_S: Final = 0.002
 """Time from the arrival of a field to a write, within which the field is the write's cause, in seconds"""
 
 
-def pulled(aside: bool, since_s: float) -> Hands:
+def pulled(aside: bool, since_s: float) -> FingerInput:
     """Return a pull of R2 and then one of L2; aside: with the left stick to the right and then to the left."""
     there = since_s % _CYCLE_S < _CYCLE_S / 2.0
     r2_n, l2_n = (_FORCE_N, 0.0) if there else (0.0, _FORCE_N)
-    return Hands(r2_n, l2_n, left_stick=((_ASIDE if there else -_ASIDE) if aside else 0.0, 0.0))
+    return FingerInput(r2_n, l2_n, left_stick=((_ASIDE if there else -_ASIDE) if aside else 0.0, 0.0))
 
 
 class Resting(PullingHands):

@@ -11,7 +11,7 @@ INTENT_EXPIRES_S: Final = 0.1
 """Age of the controller's newest state, in seconds, after which no command is sent, so that the arm stops"""
 
 
-class Hands:
+class NewestIntent:
     """Newest intent of the operator, from a controller's states."""
 
     def __init__(self, calibration: TravelCalibration, choices: Choices, *, swap_sides: bool) -> None:

@@ -31,7 +31,7 @@ _DOING: Final[dict[Phase, Doing]] = {
 
 
 @dataclass(frozen=True)
-class Hands:
+class FingerInput:
     """Forces on the triggers, in newtons, and raw positions of the sticks, -1 to 1, at one time."""
 
     r2_n: float = 0.0
@@ -40,8 +40,8 @@ class Hands:
     right_stick: Vector2 = (0.0, 0.0)
 
 
-Pull = Callable[[float], Hands]
-"""Function that returns the Hands at a time, in seconds since the pull began"""
+Pull = Callable[[float], FingerInput]
+"""Function that returns the input at a time, in seconds since the pull began"""
 
 
 def constant_force(force_n: float, across: Vector2 = (0.0, 0.0), turning: Vector2 = (0.0, 0.0)) -> Pull:
@@ -49,8 +49,8 @@ def constant_force(force_n: float, across: Vector2 = (0.0, 0.0), turning: Vector
 
     across, turning: deflections, -1 to 1. The sticks then rest, as a longer turn would leave the arm's workspace.
     """
-    straight = Hands(r2_n=force_n)
-    aside = Hands(r2_n=force_n, left_stick=_STICK.raw(across), right_stick=_STICK.raw(turning))
+    straight = FingerInput(r2_n=force_n)
+    aside = FingerInput(r2_n=force_n, left_stick=_STICK.raw(across), right_stick=_STICK.raw(turning))
     return lambda since_s: aside if since_s < _ASIDE_S else straight
 
 
@@ -82,11 +82,11 @@ class PullingHands:
             self._choose_phase(now_s, for_s, screen)
         match self.phase:
             case "rest":
-                self._act(Hands())
+                self._act(FingerInput())
             case "arm":
-                self._act(Hands(), Action.ARM if now_s - self._since_s < _PRESS_S else None)
+                self._act(FingerInput(), Action.ARM if now_s - self._since_s < _PRESS_S else None)
             case "grip":
-                self._act(Hands(), Action.CLOSE_GRIPPER)
+                self._act(FingerInput(), Action.CLOSE_GRIPPER)
             case "pull":
                 self.pull_began_s = now_s if self.pull_began_s is None else self.pull_began_s
                 hands = self._pull(now_s - self.pull_began_s)
@@ -107,7 +107,7 @@ class PullingHands:
     def _enter(self, phase: Phase, now_s: float) -> None:
         self.phase, self._since_s = phase, now_s
 
-    def _act(self, hands: Hands, action: Action | None = None) -> None:
+    def _act(self, hands: FingerInput, action: Action | None = None) -> None:
         self._device.set_finger_force(hands.l2_n, hands.r2_n)
         self._device.set_sticks(left=hands.left_stick, right=hands.right_stick)
         pressed = {BUTTON_OF[Action.RUN]} | ({BUTTON_OF[action]} if action is not None else set())

@@ -34,7 +34,7 @@ def fully(trigger: str, number: int) -> float:
     return 1.0
 
 
-class Hands:
+class CalibratingUser:
     """Simulated user: pulls a trigger or turns the sticks, as the present step of the calibration asks."""
 
     def __init__(self, wear: Wear, depth: PullDepth = fully, seed: int = 0) -> None:

@@ -43,7 +43,7 @@ def armed(target_in_tool_m: Vector3 | None = IN_REACH, **changes: Any) -> Teleme
 
 
 @dataclass(frozen=True)
-class Hands:
+class PersonInput:
     """The simulated person's inputs after one tick: forces on the triggers in newtons, sticks and buttons."""
 
     now_s: float
@@ -85,22 +85,22 @@ class Desk:
         self.person = SimulatedOperator(self.device, settings, seed, CALIBRATION)
         self.start_s = start_s
         self.ticks = 0
-        self.hands: list[Hands] = []
+        self.hands: list[PersonInput] = []
 
     @property
     def now_s(self) -> float:
         return self.start_s + self.ticks * TICK_S
 
-    def tick(self, screen: Telemetry | None, delay_s: float = 0.0) -> Hands:
+    def tick(self, screen: Telemetry | None, delay_s: float = 0.0) -> PersonInput:
         self.person.tick(self.now_s, screen, delay_s)
         self.device.read(self.now_s)
         left, right = self.device.sticks
-        done = Hands(self.now_s, self.person.phase, *self.device.forces_n, left, right, self.device.buttons)
+        done = PersonInput(self.now_s, self.person.phase, *self.device.forces_n, left, right, self.device.buttons)
         self.hands.append(done)
         self.ticks += 1
         return done
 
-    def watch(self, screen: Telemetry | None, duration_s: float, delay_s: float = 0.0) -> list[Hands]:
+    def watch(self, screen: Telemetry | None, duration_s: float, delay_s: float = 0.0) -> list[PersonInput]:
         """Show the same telemetry for `duration_s`, as a stream of frames; return the person's inputs in each tick."""
         seen = []
         frames = self._frames(screen)

@@ -12,7 +12,7 @@ import numpy as np
 from operator_side.controller.feel import SENSED_TRAVEL
 from operator_side.dualsense.simulated.trigger_model import SPRING_PRELOAD_N, SPRING_RISE_N
 from operator_side.hands.travel_calibration import StickRest, TriggerTravel
-from operator_side.people.pulling_hands import Hands, Pull
+from operator_side.people.pulling_hands import FingerInput, Pull
 
 PullKind = Literal["steady", "bell", "on_off", "random", "drift", "yaw", "swerve"]
 PULL_KINDS: Final[tuple[PullKind, ...]] = get_args(PullKind)
@@ -47,7 +47,7 @@ def make_pull(kind: PullKind, seed: int) -> Pull:
         return _swerving(generator)
     side = float(generator.choice([-1.0, 1.0]))
     stick = (side * (_STICK.dead_zone + 1.0 - _STICK.dead_zone), 0.0)
-    hands = Hands(
+    hands = FingerInput(
         r2_n=force_for(float(generator.uniform(0.25, 1.0))),
         left_stick=stick if kind == "drift" else (0.0, 0.0),
         right_stick=stick if kind == "yaw" else (0.0, 0.0),
@@ -63,12 +63,12 @@ def _bells(generator: np.random.Generator) -> Pull:
         bells.append((end_s, duration_s, float(generator.uniform(0.5, 1.0))))
         end_s += duration_s + float(generator.uniform(0.1, 0.4))
 
-    def pull(since_s: float) -> Hands:
+    def pull(since_s: float) -> FingerInput:
         for start_s, duration_s, peak in bells:
             if start_s <= since_s < start_s + duration_s:
                 x = (since_s - start_s) / duration_s
-                return Hands(r2_n=force_for(peak * 16.0 * x * x * (1.0 - x) ** 2))
-        return Hands()
+                return FingerInput(r2_n=force_for(peak * 16.0 * x * x * (1.0 - x) ** 2))
+        return FingerInput()
 
     return pull
 
@@ -80,8 +80,8 @@ def _on_off(generator: np.random.Generator) -> Pull:
         pressed_s = float(generator.uniform(0.3, 0.7))
         presses.append((end_s, end_s + pressed_s))
         end_s += pressed_s + float(generator.uniform(0.2, 0.5))
-    pressed = Hands(r2_n=force_n)
-    return lambda since_s: pressed if any(start <= since_s < end for start, end in presses) else Hands()
+    pressed = FingerInput(r2_n=force_n)
+    return lambda since_s: pressed if any(start <= since_s < end for start, end in presses) else FingerInput()
 
 
 def _swerving(generator: np.random.Generator) -> Pull:
@@ -89,9 +89,9 @@ def _swerving(generator: np.random.Generator) -> Pull:
     deflected = float(generator.uniform(0.4, 0.8)) * float(generator.choice([-1.0, 1.0]))
     ends_s = np.cumsum(generator.uniform(0.3, 0.7, size=round(_LONGEST_S / 0.3))).tolist()
 
-    def pull(since_s: float) -> Hands:
+    def pull(since_s: float) -> FingerInput:
         stick = (deflected * (-1.0) ** bisect_right(ends_s, since_s), 0.0)
-        return Hands(
+        return FingerInput(
             r2_n=force_n, left_stick=(0.0, 0.0) if turns else stick, right_stick=stick if turns else (0.0, 0.0)
         )
 
@@ -106,10 +106,10 @@ def _wandering(generator: np.random.Generator) -> Pull:
         travels.append(min(max(0.5 + 0.35 * value, 0.0), 1.0))
         value = keep * value + math.sqrt(1.0 - keep * keep) * float(generator.standard_normal())
 
-    def pull(since_s: float) -> Hands:
+    def pull(since_s: float) -> FingerInput:
         place = min(max(since_s, 0.0) / _NOISE_STEP_S, len(travels) - 2.0)
         index = int(place)
         part = place - index
-        return Hands(r2_n=force_for((1.0 - part) * travels[index] + part * travels[index + 1]))
+        return FingerInput(r2_n=force_for((1.0 - part) * travels[index] + part * travels[index + 1]))
 
     return pull

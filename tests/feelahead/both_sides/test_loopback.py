@@ -15,7 +15,7 @@ from feelahead.both_sides.loopback import Loopback, LoopbackSettings
 from feelahead.lab.approaches.approach import Approach, PullRun
 from operator_side.controller.feel import USUAL_LIGHT, WARNING_LIGHT
 from operator_side.people.person import SimulatedOperator
-from operator_side.people.pulling_hands import Hands
+from operator_side.people.pulling_hands import FingerInput
 from operator_side.people.settings import PersonSettings
 from operator_side.settings import OperatorSettings
 from robot_side.settings import RobotSettings
@@ -198,8 +198,8 @@ def test_a_person_who_is_blind_for_a_moment_lets_go_and_then_goes_on() -> None:
 
 
 def test_a_hand_that_pulls_on_through_it_moves_nothing_before_it_has_let_go() -> None:
-    def pull(since_s: float) -> Hands:
-        return Hands(r2_n=0.0 if 1.6 < since_s < 1.8 else 2.0)
+    def pull(since_s: float) -> FingerInput:
+        return FingerInput(r2_n=0.0 if 1.6 < since_s < 1.8 else 2.0)
 
     run = PullRun(Approach(DATA / "wall.xml", 0.0, link="to_operator: outage 400ms at 2s"), pull)
     began_s = run.arm()

@@ -25,7 +25,7 @@ from feelahead.lab.approaches.strengths import Draw, Judged
 from feelahead.lab.questions.coverage import QUESTION
 from feelahead.lab.sweep import ask
 from feelahead.lab.table import Row
-from operator_side.people.pulling_hands import Hands
+from operator_side.people.pulling_hands import FingerInput
 from robot_side.drivers.mujoco.camera import CameraError
 from robot_side.drivers.mujoco.posed_scene import PosedScene
 from robot_side.drivers.mujoco.scene import load_scene
@@ -219,7 +219,7 @@ def test_full_physics_does_as_reckoned_around_the_last_moment(link: str, around_
     wall, delays = frozen_scene("wall"), LINKS[link]
     approach = Approach(wall, 0.0, strongest_n=0.0, link=delays, law="none", seed=SEED, full_rate=True)
     began_s, pulls = draw.replay.record.began_s, make_pull("steady", SEED)
-    run = PullRun(approach, lambda since_s: Hands() if began_s + since_s >= last_s + around_s else pulls(since_s))
+    run = PullRun(approach, lambda since_s: FingerInput() if began_s + since_s >= last_s + around_s else pulls(since_s))
     assert run.arm() == began_s
     for _ in run.go_on(touch_s + 1.0):
         pass

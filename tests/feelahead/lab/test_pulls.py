@@ -7,13 +7,13 @@ from hypothesis import strategies as st
 from feelahead.lab.approaches.pulls import PULL_KINDS, PullKind, force_for, make_pull
 from operator_side.dualsense.simulated.trigger_model import SimulatedTrigger
 from operator_side.hands.travel_calibration import TriggerTravel
-from operator_side.people.pulling_hands import Hands, Pull
+from operator_side.people.pulling_hands import FingerInput, Pull
 
 STEP_S = 0.001
 SEEDS = range(4)
 
 
-def samples(pull: Pull, end_s: float = 19.0, step_s: float = STEP_S) -> list[Hands]:
+def samples(pull: Pull, end_s: float = 19.0, step_s: float = STEP_S) -> list[FingerInput]:
     return [pull(step_s * number) for number in range(round(end_s / step_s))]
 
 

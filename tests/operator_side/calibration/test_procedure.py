@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from operator_side.calibration.procedure import CalibrationError, CalibrationProcedure, Step
 from operator_side.controller.state import ControllerState
-from tests.helpers.calibrating_hands import REPORT_S, Hands, Wear
+from tests.helpers.calibrating_hands import REPORT_S, CalibratingUser, Wear
 
 ENDS = st.tuples(st.floats(0.0, 0.2), st.floats(0.7, 1.0))
 PLACES = st.tuples(st.floats(-0.1, 0.1), st.floats(-0.1, 0.1))
@@ -14,7 +14,7 @@ PLACES = st.tuples(st.floats(-0.1, 0.1), st.floats(-0.1, 0.1))
 
 def test_a_worn_controller() -> None:
     wear = Wear(l2=(0.1, 0.9), r2=(0.0, 0.8), left=((0.04, -0.02), (0.08, -0.02)), noise=0.01)
-    result = Hands(wear).run().result
+    result = CalibratingUser(wear).run().result
     assert result is not None
     assert result.l2.dead_zone == pytest.approx(0.13, abs=0.002)
     assert result.l2.saturation == pytest.approx(0.87, abs=0.012)
@@ -34,7 +34,7 @@ def test_the_result_makes_rest_zero_and_a_full_pull_one(
     seed: int,
 ) -> None:
     wear = Wear(l2, r2, (before, after), (after, before), noise)
-    result = Hands(wear, seed=seed).run().result
+    result = CalibratingUser(wear, seed=seed).run().result
     assert result is not None
     for trigger, (rest, end) in ((result.l2, l2), (result.r2, r2)):
         assert trigger.travel(min(1.0, rest + noise)) == 0.0
@@ -46,7 +46,7 @@ def test_the_result_makes_rest_zero_and_a_full_pull_one(
 
 
 def test_the_steps_come_in_order_and_tell_what_to_do() -> None:
-    hands = Hands(Wear())
+    hands = CalibratingUser(Wear())
     steps = [hands.procedure.step]
     while hands.procedure.step is not Step.DONE:
         hands.run(hands.now_s + 0.1)
@@ -60,15 +60,15 @@ def test_the_steps_come_in_order_and_tell_what_to_do() -> None:
 
 
 def test_pulls_that_disagree_are_asked_for_again_and_then_refused() -> None:
-    hands = Hands(Wear(), lambda _, number: 0.7 if number == 1 else 1.0)
+    hands = CalibratingUser(Wear(), lambda _, number: 0.7 if number == 1 else 1.0)
     assert hands.run().result is not None
     assert any("0.70" in complaint and "again, three times" in complaint for complaint in hands.complaints)
     with pytest.raises(CalibrationError, match=r"the pulls of R2 ended at .*0\.70.*3 attempts"):
-        Hands(Wear(), lambda trigger, number: 0.7 if trigger == "r2" and number % 2 else 1.0).run()
+        CalibratingUser(Wear(), lambda trigger, number: 0.7 if trigger == "r2" and number % 2 else 1.0).run()
 
 
 def test_the_wrong_trigger_is_pointed_out_and_does_not_count() -> None:
-    hands = Hands(Wear())
+    hands = CalibratingUser(Wear())
     while hands.procedure.step is not Step.PULL_L2:
         hands.run(hands.now_s + REPORT_S)
     for r2 in (0.0, 0.5, 1.0, 0.5, 0.0):
@@ -114,4 +114,4 @@ def test_what_never_rests_is_refused() -> None:
 )
 def test_what_is_broken_is_refused_with_its_reason(wear: Wear, pull: float, why: str) -> None:
     with pytest.raises(CalibrationError, match=why):
-        Hands(wear, lambda *_: pull).run()
+        CalibratingUser(wear, lambda *_: pull).run()

@@ -21,7 +21,7 @@ from tests.helpers.simulated_desk import (
     TICK_S,
     VIEW,
     Desk,
-    Hands,
+    PersonInput,
     armed,
     crossover,
     habitual_force_n,
@@ -66,7 +66,7 @@ def sinks(desk: Desk, from_m: float, to_m: float, speed_m_s: float) -> None:
         height_m -= speed_m_s * FRAME_S
 
 
-def stick_speed_m_s(hands: Hands) -> float:
+def stick_speed_m_s(hands: PersonInput) -> float:
     return -FULL_STICK_M_S * CALIBRATION.left_stick.deflection(hands.left)[1]
 
 
