@@ -119,7 +119,7 @@ class OperatorSide:
             self.newest_stiffness.note(update, arrival)
             self.haptics.keep_map(update)
         if arrival.fresh:
-            self._look(now_s)  # first, so that a field that has expired counts as lost even if a new one arrives now
+            self._expire(now_s)  # first, so that a field that has expired counts as lost even if a new one arrives now
             self._blindness.end()
             self.newest_stiffness.apply(update, arrival, now_s)
             self.hands.see(armed=update.state == "armed", now_s=now_s)
@@ -187,7 +187,7 @@ class OperatorSide:
 
     def motion(self, now_s: float) -> list[ToRobot]:
         """Return the messages to send now: a command if one is due; Hellos if there is none or the link is down."""
-        self._look(now_s)
+        self._expire(now_s)
         self._standing.expire(now_s)
         linked = self.newest_stiffness.within(2 * HEARTBEAT_PERIOD_S, now_s)
         messages: list[ToRobot] = []
@@ -220,14 +220,14 @@ class OperatorSide:
             return None
         return intent.resting() if self._blindness.holds else self.hands.choices.commanded(intent, now_s)
 
-    def _look(self, now_s: float) -> None:
+    def _expire(self, now_s: float) -> None:
         """Forget an expired stiffness message; an operator with the lease is blind from then on."""
         if self.newest_stiffness.expired(now_s) and self._standing.owns:
             self._blindness.lose(now_s)
 
     def feel_now(self, now_s: float) -> Feel | None:
         """Return the effects to write to the controller now; None without a change, or while a change must wait."""
-        self._look(now_s)
+        self._expire(now_s)
         update, intent = self.stiffness, self.hands.present(now_s)
         if update is not None and update.state != "armed":
             update = None

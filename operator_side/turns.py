@@ -132,7 +132,7 @@ class OperatorTurns:
             for text in self._guard.take_notes():
                 self.note(text)
         controller = self._connection.controller
-        for text in self._second_writers.look(None if controller is None else controller.path, now_s):
+        for text in self._second_writers.search(None if controller is None else controller.path, now_s):
             self.note(text)
         shows, tells = self._viewing.facts_due(now_s), status.due(now_s)
         if shows or tells:

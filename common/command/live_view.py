@@ -29,7 +29,7 @@ class LiveView:
 
     def __init__(self, robot: RobotStatus | None = None, operator: OperatorStatus | None = None) -> None:
         facts, first = phase_of(robot, operator), operator or robot
-        self.look, self.alarm = facts.look, facts.alarm
+        self.border, self.alarm = facts.border, facts.alarm
         self.phase, self.reason = phase_words(facts, first)
         self.robot, self.operator = robot or RobotStatus(), operator or OperatorStatus()
         self.side, self.scene = first or self.operator, robot or self.operator

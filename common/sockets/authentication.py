@@ -162,7 +162,7 @@ class HandshakeWatch:
             | zmq.EVENT_HANDSHAKE_FAILED_NO_DETAIL
         )
 
-    def look(self) -> None:
+    def poll(self) -> None:
         """Process ZeroMQ's handshake events since the last call; never blocks."""
         for _ in range(_EVENTS_PER_CALL):
             try:

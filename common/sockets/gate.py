@@ -35,7 +35,7 @@ class Gate:
         self.events.setsockopt(zmq.RCVHWM, 0)  # at a mark ZeroMQ's thread would wait for us
         self.events.connect(address)
 
-    def look(self, now_s: float) -> bool:
+    def poll(self, now_s: float) -> bool:
         """Process the next begin or end of a connection; return False if there is none. Never blocks."""
         if not readable(self.events):
             return False

@@ -179,7 +179,7 @@ class OperatorSockets(SocketShell):
             return
         self._next_look_s = now_s + _RETRY_S
         for part, endpoint, watch in self._watched:
-            watch.look()
+            watch.poll()
             if watch.failed:
                 watch.failed = False
                 for inbox in self._awaited:

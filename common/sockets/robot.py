@@ -218,8 +218,8 @@ class RobotSockets(SocketShell):
         now_s = self._clock.now()
         self._all_seen = False
         for _ in range(_EVENTS_PER_CALL):
-            looks = [gate.look(now_s) for gate in self._gates]
-            if not any(looks):
+            polled = [gate.poll(now_s) for gate in self._gates]
+            if not any(polled):
                 self._all_seen = True
                 break
         else:

@@ -92,7 +92,7 @@ class Phase(StrEnum):
     STARTING = "starting"
 
 
-class Look(StrEnum):
+class Border(StrEnum):
     """State of a run that the colour of the console page's border shows, visible from a distance."""
 
     LOST = "lost"

@@ -3,7 +3,7 @@
 import msgspec
 
 from common.protocol.session import SessionState
-from common.status.codes import ConnectionState, Doing, LinkState, Look, Phase, Sight
+from common.status.codes import Border, ConnectionState, Doing, LinkState, Phase, Sight
 from common.status.statuses import OperatorStatus, RobotStatus
 
 _UP_TO_ARMED = (None, Doing.RESTING, Doing.ARMING)
@@ -22,7 +22,7 @@ class PhaseFacts(msgspec.Struct, frozen=True):
     """Reason of the phase, for people, if a side gives one"""
     alarm: bool = False
     """Whether something unintended keeps the arm from moving"""
-    look: Look = Look.STARTING
+    border: Border = Border.STARTING
 
 
 def phase_of(robot: RobotStatus | None, operator: OperatorStatus | None) -> PhaseFacts:
@@ -51,5 +51,5 @@ def phase_of(robot: RobotStatus | None, operator: OperatorStatus | None) -> Phas
     )
     place = next(place for place, (holds, _, _) in enumerate(alarms + others) if holds)
     _, phase, reason = (alarms + others)[place]
-    look = Look.LOST if phase in _LOST else Look.STARTING if state is None else Look(state)
-    return PhaseFacts(phase, hands.person if phase is Phase.BUSY else None, reason, place < len(alarms), look)
+    border = Border.LOST if phase in _LOST else Border.STARTING if state is None else Border(state)
+    return PhaseFacts(phase, hands.person if phase is Phase.BUSY else None, reason, place < len(alarms), border)

@@ -36,7 +36,7 @@ reacting: the triggers resist and the person reacts."""
 _L2, R2 = 0, 1
 _SAME_CONTACT_S: Final = 0.1
 """Time in seconds after a contact within which another contact with the same object counts as the same one."""
-LOOK_S: Final = 0.05
+SAMPLE_S: Final = 0.05
 """Period at which the person's progress is examined, in seconds"""
 _TRUTH_S: Final = 0.01
 _SETTLES_S: Final = 0.3
@@ -167,11 +167,11 @@ class Watch(Listener):
         return device.strengths[trigger][zone_of(travel)] if travel > 0.0 else None
 
 
-def run_trial(trial: Trial, seed: int, look: Callable[[Watch], None] = lambda _: None) -> dict[str, Any]:
+def run_trial(trial: Trial, seed: int, sample: Callable[[Watch], None] = lambda _: None) -> dict[str, Any]:
     """Run until the person is done, or until the trial's duration is over. The same trial and seed give the same row.
 
     From the seed the scene, the errors of camera and encoders, the link's delays and the person are drawn.
-    look: called at the start and then every LOOK_S.
+    sample: called at the start and then every SAMPLE_S.
     hits: contacts of the gripper with anything but the target, and of the held object with obstacles.
     full_share: share of the time with R2 pulled in which the finger meets full strength.
     finished_s: time from arming until the object is placed and the gripper has drawn back; None if time ran out.
@@ -182,14 +182,14 @@ def run_trial(trial: Trial, seed: int, look: Callable[[Watch], None] = lambda _:
     loopback, person = watch.loopback, watch.loopback.person
     assert isinstance(person, SimulatedOperator)  # noqa: S101  # no other is given
     armed_s = done_s = None
-    look(watch)
+    sample(watch)
     while loopback.clock.now() < trial.duration_s and done_s is None:
-        loopback.run_until(min(loopback.clock.now() + LOOK_S, trial.duration_s))
+        loopback.run_until(min(loopback.clock.now() + SAMPLE_S, trial.duration_s))
         if armed_s is None and loopback.robot.session.safety.state == "armed":
             armed_s = loopback.clock.now()
         if person.phase == "done":
             done_s = loopback.clock.now()
-        look(watch)
+        sample(watch)
     # A released object may still fall.
     loopback.run_until(loopback.clock.now() + _SETTLES_S)
     task = loopback.summary()["task"]

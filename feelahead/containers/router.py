@@ -62,7 +62,7 @@ def command(arguments: Sequence[str]) -> int:
     with StopSignal() as stop:
         while not stop.is_set:
             try:
-                router.look()
+                router.check()
                 failed = 0
             except CommandFailedError as error:
                 # For example, a network was removed during the check.
@@ -92,7 +92,7 @@ class Router:
         except (BeyondNetemError, CommandFailedError) as reason:
             _say(f"NO netem ({reason}): the sides emulate the link themselves: {settings.link!r}")
 
-    def look(self) -> None:
+    def check(self) -> None:
         """Check addresses and interfaces once; set up again what changed. Raises CommandFailedError if that fails."""
         cable = self._find() or self._cable  # a side that is gone mostly comes back with the same address
         if cable is None:

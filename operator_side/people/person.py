@@ -27,7 +27,7 @@ from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.hands.button_map import BUTTON_OF, Action
 from operator_side.hands.travel_calibration import TravelCalibration
 from operator_side.people.fingers import Cue, Fingers, within_unit_circle
-from operator_side.people.looking import Glance, StalledApproach, StalledDescent
+from operator_side.people.glances import Glance, StalledApproach, StalledDescent
 from operator_side.people.settings import PersonSettings
 from operator_side.people.submove import MoveAndWait
 
@@ -156,22 +156,22 @@ class SimulatedOperator:
         self._moves.forget()
         self._nearing, self._sinking = StalledApproach(now_s), StalledDescent(now_s)
 
-    def _elapsed_s(self, look: Glance) -> float:
-        return look.now_s - self._since_s
+    def _elapsed_s(self, glance: Glance) -> float:
+        return glance.now_s - self._since_s
 
-    def _resting(self, look: Glance) -> None:
+    def _resting(self, glance: Glance) -> None:
         """Keep all inputs at rest for the second that arming requires."""
         self._fingers.do(0.0, _REST)
-        if self._elapsed_s(look) > 1.2 + self._settings.visual_reaction_s:
-            self._enter(Doing.ARMING, look.now_s)
+        if self._elapsed_s(glance) > 1.2 + self._settings.visual_reaction_s:
+            self._enter(Doing.ARMING, glance.now_s)
 
-    def _arming(self, look: Glance) -> None:
-        pressing = self._elapsed_s(look) < _PRESSES_S
+    def _arming(self, glance: Glance) -> None:
+        pressing = self._elapsed_s(glance) < _PRESSES_S
         self._fingers.do(0.0, _REST, {Button.OPTIONS} if pressing else set())
-        if look.view.state == "armed":
-            self._aim(look.now_s)
-        elif self._elapsed_s(look) > 2.0:
-            self._enter(Doing.RESTING, look.now_s)
+        if glance.view.state == "armed":
+            self._aim(glance.now_s)
+        elif self._elapsed_s(glance) > 2.0:
+            self._enter(Doing.RESTING, glance.now_s)
 
     def _aim(self, now_s: float) -> None:
         self._judge_depth()
@@ -181,122 +181,122 @@ class SimulatedOperator:
         settings = self._settings
         self._depth_error_m = float(self._generator.normal(settings.depth_error_mean_m, settings.depth_error_sd_m))
 
-    def _advancing(self, look: Glance) -> None:
+    def _advancing(self, glance: Glance) -> None:
         """Centre the target with the stick, then pull R2 until it seems to be between the fingers."""
-        if look.view.target_in_tool_m is None:
+        if glance.view.target_in_tool_m is None:
             self._fingers.do(0.0, _REST)
             return
-        across = look.view.target_in_tool_m[:2]
+        across = glance.view.target_in_tool_m[:2]
         # From above they grasp above the centre, so that what they lift does not tip over.
-        past_m = self._settings.grasp_depth_m * (-1.0 if look.view.up_in_tool[2] < _FROM_ABOVE else 1.0)
-        depth_m = look.view.target_in_tool_m[2] + past_m + self._depth_error_m
+        past_m = self._settings.grasp_depth_m * (-1.0 if glance.view.up_in_tool[2] < _FROM_ABOVE else 1.0)
+        depth_m = glance.view.target_in_tool_m[2] + past_m + self._depth_error_m
         off_m = math.hypot(*across)
         aligned = off_m < self._ALIGNED_M
-        settled = self._settings.aiming == "servo" or self._moves.free(look.now_s, look.lag_s)
-        if settled and aligned and (abs(depth_m) < self._REACHED_M or self._nearing.see(depth_m, look)):
-            self._enter(Doing.GRASPING, look.now_s)
+        settled = self._settings.aiming == "servo" or self._moves.free(glance.now_s, glance.lag_s)
+        if settled and aligned and (abs(depth_m) < self._REACHED_M or self._nearing.see(depth_m, glance)):
+            self._enter(Doing.GRASPING, glance.now_s)
             return
         # The farther the target is off the tool axis, the slower the approach; far off, they only centre it.
         eagerness = max(0.0, 1.0 - off_m / (3 * self._ALIGNED_M))
         if self._settings.aiming == "move-and-wait":
-            if self._moves.free(look.now_s, look.lag_s):
+            if self._moves.free(glance.now_s, glance.lag_s):
                 by_m = (across[0], across[1], depth_m if eagerness > 0.0 else 0.0)
                 across_m_s = GENTLY_M_S if self._gently_across else _PEAK_ACROSS_M_S
-                self._moves.begin(look.now_s, by_m, across_m_s, GENTLY_M_S if self._gently_along else _PEAK_M_S)
-            self._go(self._moves.velocity_m_s(look.now_s))
+                self._moves.begin(glance.now_s, by_m, across_m_s, GENTLY_M_S if self._gently_along else _PEAK_M_S)
+            self._go(self._moves.velocity_m_s(glance.now_s))
             return
-        x, y = (look.gain * component for component in across)
-        self._go((x, y, eagerness * look.gain * depth_m))
+        x, y = (glance.gain * component for component in across)
+        self._go((x, y, eagerness * glance.gain * depth_m))
 
-    def _grasping(self, look: Glance) -> None:
+    def _grasping(self, glance: Glance) -> None:
         self._fingers.do(0.0, _REST, {Button.CROSS})
-        if look.view.holding and self._elapsed_s(look) > 0.3:
-            self._from, self._holding_s = look.view.tool_position_m, look.now_s
-            self._gripped_height_m = look.view.tool_position_m[2]
-            self._enter(Doing.LIFTING, look.now_s)
-        elif self._elapsed_s(look) > 2.5 + 2 * self._settings.visual_reaction_s:
+        if glance.view.holding and self._elapsed_s(glance) > 0.3:
+            self._from, self._holding_s = glance.view.tool_position_m, glance.now_s
+            self._gripped_height_m = glance.view.tool_position_m[2]
+            self._enter(Doing.LIFTING, glance.now_s)
+        elif self._elapsed_s(glance) > 2.5 + 2 * self._settings.visual_reaction_s:
             self._attempt += 1
-            self._enter(Doing.RETREATING if self._attempt < self._settings.attempts else Doing.DONE, look.now_s)
+            self._enter(Doing.RETREATING if self._attempt < self._settings.attempts else Doing.DONE, glance.now_s)
 
-    def _retreating(self, look: Glance) -> None:
+    def _retreating(self, glance: Glance) -> None:
         """Open the gripper, draw back a little, and aim again."""
         self._fingers.do(-0.4, _REST, {Button.SQUARE})
-        if self._elapsed_s(look) > 1.0:
-            self._aim(look.now_s)
+        if self._elapsed_s(glance) > 1.0:
+            self._aim(glance.now_s)
 
-    def _dropped(self, look: Glance) -> bool:
+    def _dropped(self, glance: Glance) -> bool:
         """Return whether the person has given up the object, because it is no longer held."""
-        if look.view.holding:
-            self._holding_s = look.now_s
-        if look.now_s - self._holding_s <= _DROPPED_S:
+        if glance.view.holding:
+            self._holding_s = glance.now_s
+        if glance.now_s - self._holding_s <= _DROPPED_S:
             return False
-        self._enter(Doing.DONE, look.now_s)
+        self._enter(Doing.DONE, glance.now_s)
         return True
 
-    def _lifting(self, look: Glance) -> None:
+    def _lifting(self, glance: Glance) -> None:
         """Move upwards, whatever the direction of the tool is."""
-        up = look.view.up_in_tool
-        if not self._dropped(look) and math.dist(look.view.tool_position_m, self._from) > self._settings.lift_m:
-            self._from = look.view.tool_position_m
-            self._enter(Doing.CARRYING, look.now_s)
+        up = glance.view.up_in_tool
+        if not self._dropped(glance) and math.dist(glance.view.tool_position_m, self._from) > self._settings.lift_m:
+            self._from = glance.view.tool_position_m
+            self._enter(Doing.CARRYING, glance.now_s)
         # At half speed, for care.
         self._fingers.do(0.5 * up[2], (0.5 * up[0], -0.5 * up[1]), {Button.CROSS})
 
-    def _carrying(self, look: Glance) -> None:
+    def _carrying(self, glance: Glance) -> None:
         """Move back towards the robot, horizontally; do not move if the tool points straight up or down."""
-        if self._dropped(look):
+        if self._dropped(glance):
             return
-        up = look.view.up_in_tool
+        up = glance.view.up_in_tool
         back = (up[2] * up[0], up[2] * up[1], up[2] * up[2] - 1.0)
         level = math.hypot(*back)
-        left_m = level * self._settings.carry_m - math.dist(look.view.tool_position_m[:2], self._from[:2])
+        left_m = level * self._settings.carry_m - math.dist(glance.view.tool_position_m[:2], self._from[:2])
         if left_m < self._REACHED_M:
             self._judge_depth()
-            self._from = look.view.tool_position_m
-            self._enter(Doing.LOWERING, look.now_s)
+            self._from = glance.view.tool_position_m
+            self._enter(Doing.LOWERING, glance.now_s)
             left_m = 0.0
-        speed = min(_CARRY_M_S, max(look.gain * left_m, 0.0)) / max(level, self._REACHED_M)
+        speed = min(_CARRY_M_S, max(glance.gain * left_m, 0.0)) / max(level, self._REACHED_M)
         self._go((speed * back[0], speed * back[1], speed * back[2]), {Button.CROSS})
 
-    def _lowering(self, look: Glance) -> None:
+    def _lowering(self, glance: Glance) -> None:
         """Lower the object until it is felt or seen to stand: gently after a cue and near the expected height.
 
         If a stiff trigger stops it, as it may from above, press that alone, harder step by step, and rest the stick.
         """
-        if self._dropped(look):
+        if self._dropped(glance):
             return
-        stalled = self._sinking.see(look.view.tool_position_m[2], GENTLY_M_S, look)
+        stalled = self._sinking.see(glance.view.tool_position_m[2], GENTLY_M_S, glance)
         stiff = self._fingers.resisted_share() > self._settings.noticeable_force
-        stiff &= look.view.up_in_tool[2] < _FROM_ABOVE
+        stiff &= glance.view.up_in_tool[2] < _FROM_ABOVE
         if stalled and stiff and not self._stands and self._gently_m_s < _PRESSES_M_S:
             self._gently_m_s += GENTLY_M_S
-            self._sinking.presses(look.now_s)
+            self._sinking.presses(glance.now_s)
         elif stalled or self._stands:
-            self._from = look.view.tool_position_m
-            self._enter(Doing.LETTING_GO, look.now_s)
-        left_m = look.view.tool_position_m[2] - self._gripped_height_m + self._depth_error_m
-        speed = max(min(_CARRY_M_S, look.gain * left_m), self._gently_m_s)
-        x, y, z = (-speed * part for part in look.view.up_in_tool)
+            self._from = glance.view.tool_position_m
+            self._enter(Doing.LETTING_GO, glance.now_s)
+        left_m = glance.view.tool_position_m[2] - self._gripped_height_m + self._depth_error_m
+        speed = max(min(_CARRY_M_S, glance.gain * left_m), self._gently_m_s)
+        x, y, z = (-speed * part for part in glance.view.up_in_tool)
         self._go((0.0, 0.0, z) if stiff else (x, y, z), {Button.CROSS})
 
-    def _letting_go(self, look: Glance) -> None:
+    def _letting_go(self, glance: Glance) -> None:
         """Open the gripper, and rise a little, as the person has pressed the object down."""
-        risen_m = look.view.tool_position_m[2] - self._from[2]
-        if not look.view.holding and (risen_m > _CLEAR_M or self._elapsed_s(look) > _CLEARS_S + look.lag_s):
-            self._from = look.view.tool_position_m
-            self._enter(Doing.DRAWING_BACK, look.now_s)
-        rises = 0.0 if look.view.holding or self._elapsed_s(look) < 0.6 else GENTLY_M_S
-        x, y, z = (rises * part for part in look.view.up_in_tool)
+        risen_m = glance.view.tool_position_m[2] - self._from[2]
+        if not glance.view.holding and (risen_m > _CLEAR_M or self._elapsed_s(glance) > _CLEARS_S + glance.lag_s):
+            self._from = glance.view.tool_position_m
+            self._enter(Doing.DRAWING_BACK, glance.now_s)
+        rises = 0.0 if glance.view.holding or self._elapsed_s(glance) < 0.6 else GENTLY_M_S
+        x, y, z = (rises * part for part in glance.view.up_in_tool)
         self._go((x, y, z), {Button.SQUARE})
 
-    def _drawing_back(self, look: Glance) -> None:
-        back_m = math.dist(look.view.tool_position_m, self._from)
-        if back_m > _BACK_M or self._nearing.see(_BACK_M - back_m, look):
-            self._enter(Doing.DONE, look.now_s)
+    def _drawing_back(self, glance: Glance) -> None:
+        back_m = math.dist(glance.view.tool_position_m, self._from)
+        if back_m > _BACK_M or self._nearing.see(_BACK_M - back_m, glance):
+            self._enter(Doing.DONE, glance.now_s)
         self._go((0.0, 0.0, -_CARRY_M_S), {Button.SQUARE} if back_m < 0.5 * _BACK_M else set())
 
-    def _done(self, look: Glance) -> None:
-        self._fingers.do(0.0, _REST, {Button.CROSS} if look.view.holding else set())
+    def _done(self, glance: Glance) -> None:
+        self._fingers.do(0.0, _REST, {Button.CROSS} if glance.view.holding else set())
 
     def _go(self, velocity_m_s: Vector3, buttons: set[Button] | None = None) -> None:
         """Move the tool at this velocity, limited where the person goes gently.

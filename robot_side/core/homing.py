@@ -27,7 +27,7 @@ CLEAR_M: Final = 0.01
 """Distance beyond the enlargement within which something may be touched"""
 _STEP_RAD: Final = 0.04
 """Largest motion of a joint between two places that are looked at"""
-_LOOK_S: Final = 0.001
+_CHECK_S: Final = 0.001
 _AGAIN_S: Final = 0.005
 _MOST_S: Final = 0.02
 """Time from the look at a place to that at the next, in s: at first, and while the arm moves; longest time whose looks
@@ -93,13 +93,13 @@ class Homing:
             self._note_near(state, grip, objects)
         self._next_s = max(self._next_s, state.time_s - _MOST_S)
         while self._next_s <= state.time_s:
-            self._look(state, grip, objects)
+            self._check(state, grip, objects)
             if self._refused is not None:
                 return self._refused
-            self._next_s += _AGAIN_S if self._free else _LOOK_S
+            self._next_s += _AGAIN_S if self._free else _CHECK_S
         return self._velocity(state, command.home) if self._free else np.zeros(self._home_rad.size)
 
-    def _look(self, state: ArmState, grip: Grip, objects: PerceivedObjects) -> None:
+    def _check(self, state: ArmState, grip: Grip, objects: PerceivedObjects) -> None:
         """Look at the next place on the way, and begin again once all were free."""
         left_rad = self._home_rad - state.joint_positions_rad
         places = max(1, math.ceil(np.abs(left_rad).max(initial=0.0) / _STEP_RAD))

@@ -9,7 +9,7 @@ from typing import Any, Final
 import numpy as np
 
 from common.companion.process import Companion
-from feelahead.both_sides.grasping_trial import LOOK_S, R2, Trial, Watch, run_trial
+from feelahead.both_sides.grasping_trial import R2, SAMPLE_S, Trial, Watch, run_trial
 from operator_side.controller.feel import MAX_STRENGTH
 from robot_side.drivers.mujoco.viewpoints import Triple, Viewpoint
 from robot_side.viewing.exchange import (
@@ -29,21 +29,21 @@ _SILENT_S: Final = 30.0
 
 
 def compared_run(trial: Trial, seed: int, advance: Callable[[float], None], *, pictures: bool) -> dict[str, Any]:
-    """Run a trial; return its figures, a sample every LOOK_S and as many pictures as JPEG in base64.
+    """Run a trial; return its figures, a sample every SAMPLE_S and as many pictures as JPEG in base64.
 
     advance: called with the seconds that have passed.
     """
     samples = _Samples(advance, pictures=pictures)
     try:
-        row = run_trial(trial, seed, samples.look)
+        row = run_trial(trial, seed, samples.add)
         samples.wait()
     finally:
         samples.close()
     gaps = [gap for gap in samples.columns["gap_mm"] if gap is not None]
     return {
         "figures": {**row, "least_gap_mm": min(gaps, default=None)},
-        "period_s": LOOK_S,
-        "took_s": LOOK_S * (len(samples.columns["gap_mm"]) - 1),
+        "period_s": SAMPLE_S,
+        "took_s": SAMPLE_S * (len(samples.columns["gap_mm"]) - 1),
         **samples.columns,
         "pictures": samples.pictures,
         "trouble": samples.trouble,
@@ -64,7 +64,7 @@ class _Samples:
         self._companion = Companion(MODULE, room_bytes=1 << 26) if pictures else None
         self._tool_m: Any = None
 
-    def look(self, watch: Watch) -> None:
+    def add(self, watch: Watch) -> None:
         """Take a sample, and order a picture."""
         site_m = watch.scene.data.site_xpos[watch.scene.robot.site].copy()
         moved_m = 0.0 if self._tool_m is None else float(np.linalg.norm(site_m - self._tool_m))
@@ -76,7 +76,7 @@ class _Samples:
             "pull": watch.loopback.device.travel[R2],
             "resist": (watch.strength_of(R2) or 0) / MAX_STRENGTH,
             "gap_mm": None if gap_m is None else 1e3 * max(gap_m, 0.0),
-            "speed_mm_s": 1e3 * moved_m / LOOK_S,
+            "speed_mm_s": 1e3 * moved_m / SAMPLE_S,
             "hits": watch.hits,
             "fastest_mm_s": None if watch.fastest_m_s is None else 1e3 * watch.fastest_m_s,
         }
@@ -84,7 +84,7 @@ class _Samples:
             self.columns[name].append(round(value, 3) if isinstance(value, float) else value)
         self._order(watch, first=first)
         if not first:
-            self._advance(LOOK_S)
+            self._advance(SAMPLE_S)
 
     def _order(self, watch: Watch, *, first: bool) -> None:
         if (companion := self._companion) is None:

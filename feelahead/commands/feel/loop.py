@@ -87,7 +87,7 @@ class Desk:
             self._guard_s = now_s + _GUARD_PERIOD_S
             notes += self._guard.take_notes()
         controller = self._connection.controller
-        return notes + self._writers.look(None if controller is None else controller.path, now_s)
+        return notes + self._writers.search(None if controller is None else controller.path, now_s)
 
 
 def live(desk: Desk, activity: Activity, typed: Typed, clock: Clock, stop: StopSignal) -> None:

@@ -52,7 +52,7 @@ class SecondWriters:
         self._next_s = 0.0
         self._said: set[str] = set()
 
-    def look(self, path: bytes | None, now_s: float) -> list[str]:
+    def search(self, path: bytes | None, now_s: float) -> list[str]:
         """Search a little more; return notes about writers that were not reported before. path: None for no node."""
         if path != self._path:
             self._path, self._next_s, self._said = path, now_s, set()

@@ -38,7 +38,7 @@ from common.protocol.view_messages import (
     VideoStep,
 )
 from common.roles import ROLES, Role
-from common.status.codes import InputSource, Look
+from common.status.codes import Border, InputSource
 from operator_side.controller.feel import SENSED_TRAVEL
 from operator_side.viewing.facts import OperatorFacts, ShownKind
 
@@ -217,11 +217,11 @@ class _Process:
 
 
 def said(facts: OperatorFacts) -> dict[str, Any]:
-    """Return the texts that a page shows, and the look (`Look`) of its state; None for what is unknown."""
+    """Return the texts that a page shows, and the colour of its border (`Border`); None for what is unknown."""
     status, view = facts.status, LiveView(None, facts.status)
-    state = view.phase if view.alarm or view.look is Look.STARTING else words(view.look)
+    state = view.phase if view.alarm or view.border is Border.STARTING else words(view.border)
     return {
-        "look": view.look,
+        "border": view.border,
         "state": state.upper(),
         "why": (None if state == view.phase else view.phase, view.reason),
         "link": link_words(status),

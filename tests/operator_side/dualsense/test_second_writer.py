@@ -41,13 +41,13 @@ def test_a_loop_searches_a_little_in_each_turn_and_reports_each_writer_once(tmp_
         notes = []
         for _ in range(round(seconds / PERIOD_OF_TURNS_S)):
             now_s += PERIOD_OF_TURNS_S
-            notes += writers.look(PATH, now_s)
+            notes += writers.search(PATH, now_s)
         return notes
 
     assert looked(1.0) == []
     add_process(tmp_path, 11, "steam", {NODE: os.O_RDWR})
     assert list(search_writers(PATH, tmp_path)).count(None) > len(MANY)  # A turn takes only some of them.
-    assert writers.look(None, now_s) == []
+    assert writers.search(None, now_s) == []
     [note] = looked(1.0)
     assert note.startswith("steam (11) holds the controller open for writing, too: ")
     assert "Steam Input" in note

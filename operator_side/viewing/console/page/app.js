@@ -115,7 +115,7 @@ function showFacts(message) {
   clock.set(facts.now_s, facts.offset_s);
   const { status } = facts;
   const { said } = message;
-  document.body.dataset.state = said.look;
+  document.body.dataset.state = said.border;
   text("state", said.state);
   text("why", [...said.why, run.live ? null : "replay"].filter(Boolean).join(" · "));
   text("link", said.link, status.link !== LinkState.UP);
@@ -216,7 +216,7 @@ function showNote(note) {
   byId("notes").scrollTop = byId("notes").scrollHeight;
 }
 
-function look() {
+function refresh() {
   const silentMs = performance.now() - heardMs;
   const open = socket?.readyState === WebSocket.OPEN;
   const lost = !open || ((run.live || !everHeard) && silentMs > SILENCE_MS);
@@ -228,10 +228,10 @@ function look() {
     because.textContent = ended ? "" : old + (open ? "The operator side is silent." : `The console: ${closedBecause || "not reached yet"}.`);
   }
   const limits = facts?.pictures;
-  views.forEach((view, k) => view.look(limits?.old_s[k] ?? null, limits?.dead_s[k]));
+  views.forEach((view, k) => view.showAge(limits?.old_s[k] ?? null, limits?.dead_s[k]));
 }
 
 document.addEventListener("visibilitychange", () => send({ looks: !document.hidden }));
 connect();
-setInterval(look, 100);
+setInterval(refresh, 100);
 setInterval(() => Object.values(charts).forEach((chart) => chart.draw(clock.nowMs)), 100);

@@ -74,7 +74,7 @@ export class View {
   }
 
   // oldS: age from which it is old, null while unknown; deadS: silence from which it is dead.
-  look(oldS, deadS = DEAD_S) {
+  showAge(oldS, deadS = DEAD_S) {
     if (this.capturedS === null) return;
     const silentS = (this.#clock.nowMs - this.#shownMs) / 1000;
     const ageS = this.#clock.ageS(this.capturedS);

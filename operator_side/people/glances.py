@@ -33,11 +33,11 @@ class StalledApproach:
     def __init__(self, now_s: float) -> None:
         self._nearest_m, self._nearer_s = math.inf, now_s
 
-    def see(self, distance_m: float, look: Glance) -> bool:
+    def see(self, distance_m: float, glance: Glance) -> bool:
         """Take the distance that seems left; return whether the target has come no nearer for some time."""
         if distance_m < self._nearest_m - _PROGRESS_M:
-            self._nearest_m, self._nearer_s = distance_m, look.now_s
-        return look.now_s - self._nearer_s > _NO_FURTHER_S + look.lag_s
+            self._nearest_m, self._nearer_s = distance_m, glance.now_s
+        return glance.now_s - self._nearer_s > _NO_FURTHER_S + glance.lag_s
 
 
 class StalledDescent:
@@ -53,12 +53,12 @@ class StalledDescent:
         """Note that the hand presses harder from now on, so that only what is seen of its outcome counts."""
         self._pressed_s = now_s
 
-    def see(self, height_m: float, slowest_m_s: float, look: Glance) -> bool:
+    def see(self, height_m: float, slowest_m_s: float, glance: Glance) -> bool:
         """Take the height; return whether the object stands. A moving object sinks at `slowest_m_s` or faster."""
-        self._heights.append((look.now_s, height_m))
-        while self._heights[0][0] < look.now_s - _STANDS_S:
+        self._heights.append((glance.now_s, height_m))
+        while self._heights[0][0] < glance.now_s - _STANDS_S:
             self._heights.popleft()
         share = (self._heights[0][1] - height_m) / (slowest_m_s * _STANDS_S)
         # A slight sinking before lowering does not count; an object that never sinks is stopped, too.
-        self._sank |= share > 0.5 or look.now_s - self._began_s > _NO_FURTHER_S + look.lag_s
-        return self._sank and share < 0.2 and look.now_s - self._pressed_s > _STANDS_S + look.lag_s
+        self._sank |= share > 0.5 or glance.now_s - self._began_s > _NO_FURTHER_S + glance.lag_s
+        return self._sank and share < 0.2 and glance.now_s - self._pressed_s > _STANDS_S + glance.lag_s
