@@ -82,13 +82,13 @@ class OperatorTurns:
         """Return the control and view messages that have arrived."""
         return self._sockets.receive(), self._sockets.receive_view()
 
-    def take(self, received: tuple[Sequence[bytes], Sequence[tuple[bytes, bytes]]], now_s: float) -> None:
+    def handle(self, received: tuple[Sequence[bytes], Sequence[tuple[bytes, bytes]]], now_s: float) -> None:
         """Handle the messages, and write the resulting effects to the controller."""
         control, seen = received
         for payload in control:
             self._core.receive(payload, now_s)
         for topic, payload in seen:
-            if not self._viewing.take(topic, payload, now_s):
+            if not self._viewing.receive(topic, payload, now_s):
                 self._core.receive_view(payload, now_s)
         self._connection.beat(now_s)
         if (feel := self._core.feel_now(now_s)) is not None:

@@ -68,7 +68,7 @@ class RobotTurns:
         """Whether the arm is not armed."""
         return self._core.session.safety.state != "armed"
 
-    def take(self, received: Sequence[tuple[bytes, bytes]], now_s: float) -> None:
+    def handle(self, received: Sequence[tuple[bytes, bytes]], now_s: float) -> None:
         """Give the payloads that are admitted to the core."""
         for peer, payload in self._admission.admitted(received, self._core.session.owner_peer, now_s):
             self._core.receive(peer, payload, now_s)

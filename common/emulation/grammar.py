@@ -51,7 +51,7 @@ class _Words:
             raise ConfigurationError(f"link {self.spec!r}: the clause {self.clause!r} is unknown; valid: {valid}")
         return True
 
-    def take_if(self, word: str) -> bool:
+    def accept(self, word: str) -> bool:
         return self._words[-1:] == [word] and bool(self._words.pop())
 
     def number_follows(self, *, percent: bool) -> bool:
@@ -111,7 +111,7 @@ def _delay(words: _Words) -> dict[str, Any]:
         if words.number_follows(percent=True):
             # Without effect, as in netem: its delays stay independent (measured lag-1 correlation 0).
             words.value(parse_share, "correlation")
-    if words.take_if("distribution"):
+    if words.accept("distribution"):
         if "jitter_s" not in found:
             raise words.error("'distribution' is given without a jitter, whose distribution it is")
         found["distribution"] = words.value(_shape, "distribution")
@@ -119,19 +119,19 @@ def _delay(words: _Words) -> dict[str, Any]:
 
 
 def _loss(words: _Words) -> dict[str, Any]:
-    if words.take_if("gemodel"):
+    if words.accept("gemodel"):
         p, *rest = words.shares("p", "r", "1-h", "1-k")
         # One probability alone is independent loss: with r = 1 − p the next state does not depend on the last.
         return {"loss": GilbertElliott(p, *(rest or [1.0 - p]))}
-    if words.take_if("state"):
+    if words.accept("state"):
         raise words.error("'loss state' is not emulated")
-    words.take_if("random")
+    words.accept("random")
     return {"loss": RandomLoss(*words.shares("probability", "correlation"))}
 
 
 def _chance(words: _Words) -> dict[str, Any]:
     found: dict[str, Any] = {words.clause: Chance(*words.shares("probability", "correlation"))}
-    if words.clause == "reorder" and words.take_if("gap"):
+    if words.clause == "reorder" and words.accept("gap"):
         found["gap"] = words.value(_positive, "gap")
     return found
 
@@ -144,10 +144,10 @@ def _rate(words: _Words) -> dict[str, Any]:
 
 def _outage(words: _Words) -> dict[str, Any]:
     duration_s = words.value(parse_duration, "duration")
-    if not words.take_if("at"):
+    if not words.accept("at"):
         raise words.error("'outage' is given without 'at' and a time")
     at_s = words.value(parse_duration, "begin")
-    every_s = words.value(parse_duration, "period") if words.take_if("every") else None
+    every_s = words.value(parse_duration, "period") if words.accept("every") else None
     return {"outages": (Outage(duration_s, at_s, every_s),)}
 
 

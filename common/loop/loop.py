@@ -25,7 +25,7 @@ class Side(Protocol[Received]):
     def receive(self) -> Received:
         """Return the messages that have arrived."""
 
-    def take(self, received: Received, now_s: float) -> None:
+    def handle(self, received: Received, now_s: float) -> None:
         """Process the messages."""
 
     def turn(self, now_s: float) -> None:
@@ -71,7 +71,7 @@ class Loop:
                 now_s = clock.now()
                 if duration_s is not None and now_s - self.start_s >= duration_s:
                     break
-                side.take(received, now_s)
+                side.handle(received, now_s)
                 turned = pacer.due(now_s)
                 if turned:
                     pacer.begin(now_s)

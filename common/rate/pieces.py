@@ -42,7 +42,7 @@ class Joining:
         self._limit_bytes = limit_bytes
         self._begun: dict[int, _Whole] = {}
 
-    def take(self, piece: bytes) -> bytes | None:
+    def add(self, piece: bytes) -> bytes | None:
         """Add one piece; return the whole message if this piece completes it, else None."""
         if len(piece) <= HEAD_BYTES:
             self.rejected += 1

@@ -30,7 +30,7 @@ class Content:
         self._drawing = Drawing(file)
         self._objects: tuple[str, ...] = ()
 
-    def take(self, source: int, message: bytes) -> None:
+    def write(self, source: int, message: bytes) -> None:
         """Write a message of the side `source`; ValueError if it is invalid, KeyError if it precedes the header."""
         kind, content = message[:1], message[1:]
         if kind == HEADER:

@@ -89,7 +89,7 @@ class _Writer:
                 self._through.append(channel)
                 continue
             try:
-                self._content.take(id(channel), message)
+                self._content.write(id(channel), message)
             except (ValueError, KeyError, TypeError, struct.error) as error:
                 # One side's invalid messages must not lose the other's.
                 print(

@@ -70,7 +70,7 @@ class ClockOffset:
             return True
         self._echoed_s = local_sent_s
         offset_s, margin_s = peer_sent_s - peer_held_s - local_sent_s, self._margin(peer_sent_s, local_received_s)
-        agrees = [one.take_greatest(offset_s, local_sent_s, margin_s) for one in (self._interval, self._next)]
+        agrees = [one.bound_above(offset_s, local_sent_s, margin_s) for one in (self._interval, self._next)]
         self._contradictions_to = self._judge(agrees[0], self._contradictions_to, local_received_s)
         return True
 
@@ -83,7 +83,7 @@ class ClockOffset:
             return
         self._advance(local_received_s)
         offset_s, margin_s = peer_sent_s - local_received_s, self._margin(peer_sent_s, local_received_s)
-        agrees = [one.take_least(offset_s, margin_s) for one in (self._interval, self._next)]
+        agrees = [one.bound_below(offset_s, margin_s) for one in (self._interval, self._next)]
         self._contradictions_from = self._judge(agrees[0], self._contradictions_from, local_received_s)
 
     def _advance(self, now_s: float) -> None:

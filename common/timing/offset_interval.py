@@ -35,7 +35,7 @@ class OffsetInterval:
         """Whether both bounds are known."""
         return self._greatest_s - self._least_s < math.inf
 
-    def take_least(self, offset_s: float, margin_s: float) -> bool:
+    def bound_below(self, offset_s: float, margin_s: float) -> bool:
         """Bound the present offset below by `offset_s` − `margin_s`.
 
         Return False, and change nothing, if that contradicts the upper bound.
@@ -45,7 +45,7 @@ class OffsetInterval:
         self._least_s = max(self._least_s, offset_s - margin_s)
         return True
 
-    def take_greatest(self, offset_s: float, since_s: float, margin_s: float) -> bool:
+    def bound_above(self, offset_s: float, since_s: float, margin_s: float) -> bool:
         """Bound above by `offset_s` + `margin_s` the offset at some unknown time between `since_s` and now.
 
         Return False, and change nothing, if that contradicts the lower bound.

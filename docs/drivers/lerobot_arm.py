@@ -56,7 +56,7 @@ class VelocityArm:
         self._goals: list[float] = []
         self._command: dict[str, Any] | None = None
 
-    def take(self, command: dict[str, Any]) -> None:
+    def obey(self, command: dict[str, Any]) -> None:
         """Follow another command from now on."""
         self._command = command
 
@@ -142,7 +142,7 @@ def drive(
                 print("refused:", message["refused"], flush=True)
             else:
                 newest, read_s = message, time.monotonic()
-                arm.take(newest)
+                arm.obey(newest)
         with contextlib.suppress(ConnectionError):
             arm.move(time.monotonic())
         sequence, sent_s = sequence + 1, time.monotonic()

@@ -82,7 +82,7 @@ def play_in_terminal(recording: Recording, speed: float) -> int:
             if one.kind == ROBOT:
                 robot = msgspec.json.decode(one.content, type=RobotStatus)
             elif one.kind == VIEW:
-                figures.take(one.content)
+                figures.receive(one.content)
             else:
                 facts = decoder.decode(one.content)
                 status.show_facts(msgspec.structs.replace(facts, robot=robot, scene=figures.newest))

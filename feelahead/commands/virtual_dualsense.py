@@ -105,9 +105,9 @@ class _Narrated(SimulatedDualSense):
         self._effects = dict.fromkeys(("L2", "R2"), encode_effect(FREE_TRIGGER))
         self._last_words = self._state_in_words()
 
-    def take_report(self, report: bytes, now_s: float) -> None:
+    def apply_report(self, report: bytes, now_s: float) -> None:
         """Apply an output report, and print the changes."""
-        super().take_report(report, now_s)
+        super().apply_report(report, now_s)
         l2, r2 = encoded_effects(report)
         self._effects = {"L2": l2 or self._effects["L2"], "R2": r2 or self._effects["R2"]}
         words = self._state_in_words()

@@ -44,7 +44,7 @@ class Comparison:
         """Whether the differences are no larger than those between two kinds of processor."""
         return self.worst_eighths <= WITHIN_EIGHTHS and self.worst_m <= WITHIN_M
 
-    def take(self, first: bytes | None, second: bytes | None, *, feel: bool = False) -> None:
+    def compare(self, first: bytes | None, second: bytes | None, *, feel: bool = False) -> None:
         """Compare the recorded message `first` with the recomputed `second`; None for a missing one.
 
         feel: whether the two are effects for the controller instead.
@@ -68,7 +68,7 @@ class Comparison:
     def missed(self, made: deque[bytes], *, feel: bool = False) -> None:
         """Count each recomputed item left in `made` as missing in the recording, and remove it."""
         while made:
-            self.take(None, made.popleft(), feel=feel)
+            self.compare(None, made.popleft(), feel=feel)
 
     def lines(self) -> list[str]:
         """Return the lines that report the comparison."""

@@ -50,7 +50,7 @@ def replay_operator(recording: Recording) -> Comparison:
             case Kind.HANDS:
                 core.read_state(read_value(content, ControllerState), now_s)
             case Kind.TOLD:
-                compared.take(content, feels.popleft() if feels else None, feel=True)
+                compared.compare(content, feels.popleft() if feels else None, feel=True)
             case Kind.MOTION:
                 compared.missed(sent)
                 sent.extend(message.payload for message in core.motion(now_s))
@@ -60,7 +60,7 @@ def replay_operator(recording: Recording) -> Comparison:
                     feels.append(msgspec.msgpack.encode(feel))
             case Kind.SENT:
                 payload = split_text(split_text(content)[1])[1]
-                compared.take(payload, sent.popleft() if sent else None)
+                compared.compare(payload, sent.popleft() if sent else None)
     compared.missed(sent)
     compared.missed(feels, feel=True)
     return compared

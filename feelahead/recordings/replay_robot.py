@@ -94,7 +94,7 @@ def replay_robot(recording: Recording) -> Comparison:
             made.extend(one.payload for one in core.tick(entry.now_s))
         elif entry.kind == Kind.SENT:
             payload = split_text(split_text(entry.content)[1])[1]
-            compared.take(payload, made.popleft() if made else None)
+            compared.compare(payload, made.popleft() if made else None)
     compared.missed(made)
     return compared
 

@@ -43,7 +43,7 @@ class SceneFigures:
         self.newest: SceneFacts | None = None
         """Newest figures; None before the first"""
 
-    def take(self, payload: bytes) -> None:
+    def receive(self, payload: bytes) -> None:
         """Take a payload of the topic `scene`. Shapes, which are large, and invalid payloads are ignored."""
         with contextlib.suppress(RemoteProtocolError):
             if claims_to_be("scene", payload) and isinstance(state := decode_view(payload), SceneState):
@@ -87,18 +87,18 @@ class Viewing:
         if self.console is not None:
             self.console.note(text)
 
-    def take(self, topic: bytes, payload: bytes, now_s: float) -> bool:
+    def receive(self, topic: bytes, payload: bytes, now_s: float) -> bool:
         """Take a payload, and show it once its pieces are joined; return False if its topic is not a view's."""
         of, is_piece, _ = topic.partition(PIECE)
         if of not in self._joining:
             return False
         if is_piece:
-            whole = self._joining[of].take(payload)
-            return whole is None or self.take(of, whole, now_s)
+            whole = self._joining[of].add(payload)
+            return whole is None or self.receive(of, whole, now_s)
         if topic == SCENE_TOPIC and self._status.wants_facts:
-            self._figures.take(payload)
+            self._figures.receive(payload)
         if topic == VIDEO_TOPIC:
-            self._pages.pictures.take(payload, now_s)
+            self._pages.pictures.receive(payload, now_s)
         if self.console is not None:
             self.console.view(payload, video=topic == VIDEO_TOPIC)
             self.has_shown_picture |= topic == VIDEO_TOPIC and self.console.pages > 0

@@ -22,7 +22,7 @@ class Episodes:
         self._notes: deque[str] = deque(maxlen=_MOST)
         self._counts: Counter[str] = Counter()
 
-    def take(self, kind: EpisodeMark, *, owns: bool, armed: bool) -> str:
+    def mark(self, kind: EpisodeMark, *, owns: bool, armed: bool) -> str:
         """Take a mark, and put the scene back for `reset`; return why it is refused, empty if it is accepted.
 
         owns: it is the owner's.

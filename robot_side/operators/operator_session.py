@@ -136,10 +136,10 @@ class OperatorSession:
         elif isinstance(message, Mark):
             if message.number > participant.marked[0]:
                 owns, armed = participant is self.lease.owner, self.safety.state == "armed"
-                participant.marked = message.number, self.episodes.take(message.kind, owns=owns, armed=armed)
+                participant.marked = message.number, self.episodes.mark(message.kind, owns=owns, armed=armed)
         elif message.number > participant.tuned:
             participant.tuned = message.number
-            granted = self.tuning.take(message, now_s, owns=participant is self.lease.owner)
+            granted = self.tuning.grant(message, now_s, owns=participant is self.lease.owner)
             if granted and message.link is not None:
                 participant.link.expect_other_delay()
 

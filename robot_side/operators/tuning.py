@@ -37,7 +37,7 @@ class Tuning:
         if self._start_s is None:
             self._start_s = now_s
 
-    def take(self, tune: Tune, now_s: float, *, owns: bool) -> bool:
+    def grant(self, tune: Tune, now_s: float, *, owns: bool) -> bool:
         """Grant a request as a whole, or refuse it; return whether it was granted. owns: whether the owner sent it."""
         if self._expect is None or not owns:
             why = (

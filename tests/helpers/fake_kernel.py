@@ -70,7 +70,7 @@ class PlainController(SimulatedDualSense):
         self.reads += 1
         return bytes([1, self.reads % 256])
 
-    def take_report(self, report: bytes, now_s: float) -> None:
+    def apply_report(self, report: bytes, now_s: float) -> None:
         del now_s
         if report[0] != 2:
             raise ValueError(f"report {report[0]}")

@@ -78,7 +78,7 @@ class Operator:
     def updates(self) -> list[StiffnessUpdate]:
         return [message for message in self.inbox if isinstance(message, StiffnessUpdate)]
 
-    def take(self, message: StiffnessUpdate | Hello | LeaseNotice, now_s: float) -> None:
+    def receive(self, message: StiffnessUpdate | Hello | LeaseNotice, now_s: float) -> None:
         self.inbox.append(message)
         arrival = self.link.arrived(message, now_s)
         if isinstance(message, LeaseNotice) and arrival.fresh:
@@ -150,7 +150,7 @@ class Bench:
                 elif (operator := self.operators.get(outgoing.peer)) is not None and not isinstance(
                     message, MotionCommand | Watch | Tune | Mark | LinkReport
                 ):
-                    operator.take(message, self.now_s)
+                    operator.receive(message, self.now_s)
 
     def silence(self, duration_s: float) -> None:
         self.tick(round(duration_s / TICK_S))

@@ -64,7 +64,7 @@ def _measured(sockets: OperatorSockets, ports: tuple[int, int], clock: Monotonic
             times_s += [now_s] * len(received)
             arrived_bytes += sum(map(len, received)) + sum(len(payload) for _, payload in seen)
         for topic, payload in seen:
-            whole = joining.take(payload) if topic == VIDEO_TOPIC + PIECE else payload
+            whole = joining.add(payload) if topic == VIDEO_TOPIC + PIECE else payload
             if settled and whole is not None and (frame := _picture(whole)) is not None:
                 pictures[frame.view].append((now_s, frame.captured_s))
         if (state := hands.read(now_s)) is not None:

@@ -166,7 +166,7 @@ class SimulatedDualSense:
         report, self._unread = self._unread, None
         return report
 
-    def take_report(self, report: bytes, now_s: float) -> None:
+    def apply_report(self, report: bytes, now_s: float) -> None:
         """Apply an output report; if it cannot be decoded, change nothing and raise ValueError."""
         self._require_open()
         try:

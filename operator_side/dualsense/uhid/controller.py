@@ -148,7 +148,7 @@ class UhidController:
         try:
             if kind != _OUTPUT_REPORT:
                 raise ValueError(f"kind = {kind}; valid: {_OUTPUT_REPORT}")
-            self._controller.take_report(report, now_s)
+            self._controller.apply_report(report, now_s)
         except ValueError:
             self.counts.refused += 1
             return False

@@ -72,7 +72,7 @@ class _View:
     def size_bytes(self) -> int:
         return max(self._sizes, default=0)
 
-    def take(self, captured_s: float, size_bytes: int, now_s: float) -> None:
+    def note(self, captured_s: float, size_bytes: int, now_s: float) -> None:
         if 0.0 <= self.captured_s - captured_s < _OTHER_CLOCK_S:
             return
         if captured_s > self.captured_s > -math.inf:
@@ -94,13 +94,13 @@ class Pictures:
         self._control_p95_s: float | None = None
         self._fresh_s = self._measured_s = self._followed_s = -math.inf
 
-    def take(self, payload: bytes, now_s: float) -> None:
+    def receive(self, payload: bytes, now_s: float) -> None:
         """Take a payload of the topic `video`; an invalid one is ignored."""
         with contextlib.suppress(RemoteProtocolError):
             seen = decode_view(payload)
             if isinstance(seen, VideoFrame | VideoStep):
                 size_bytes = len(seen.jpeg if isinstance(seen, VideoFrame) else seen.h264)
-                self._views[seen.view].take(seen.captured_s, size_bytes, now_s)
+                self._views[seen.view].note(seen.captured_s, size_bytes, now_s)
 
     def follow(self, core: OperatorSide, shown_s: float | None, now_s: float) -> None:
         """Measure, and let the hands fade or return.

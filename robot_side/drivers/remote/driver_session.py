@@ -34,17 +34,17 @@ class DriverClock:
         self._interval = OffsetInterval(MAX_SKEW)
         self._at_s = 0.0
 
-    def take(self, sent_s: float, received_s: float, echoed: tuple[float, float] | None) -> bool:
+    def update(self, sent_s: float, received_s: float, echoed: tuple[float, float] | None) -> bool:
         """Take a message's stamps; False if they contradict earlier stamps, because a clock jumped or a stamp is false.
 
         echoed: our stamp that the message echoes, and the time for which the driver held it.
         """
         self._at_s, margin_s = max(self._at_s, received_s), ROUNDING * (abs(sent_s) + abs(received_s))
         self._interval.advance(received_s)
-        possible = self._interval.take_least(sent_s - received_s, margin_s)
+        possible = self._interval.bound_below(sent_s - received_s, margin_s)
         if echoed is not None and possible:
             echo_s, held_s = echoed
-            possible = self._interval.take_greatest(sent_s - held_s - echo_s, echo_s, margin_s)
+            possible = self._interval.bound_above(sent_s - held_s - echo_s, echo_s, margin_s)
         return possible
 
     @property
@@ -233,7 +233,7 @@ class DriverSession:
         self._heard_s, self._sequence = received_s, said.sequence
         ours = said.echo_s is not None and self._first_sent_s <= said.echo_s <= received_s
         echoed = (said.echo_s, said.held_s) if ours and said.echo_s is not None else None
-        if not self._clock.take(said.sent_s, received_s, echoed):
+        if not self._clock.update(said.sent_s, received_s, echoed):
             self._clock = DriverClock()
             self._reject(
                 "clock",

@@ -28,7 +28,7 @@ class Steps:
             self.clock.advance_to(self.clock.now() + STOPPED_S)
         return "message"
 
-    def take(self, received: str, now_s: float) -> None:
+    def handle(self, received: str, now_s: float) -> None:
         self.done.append((received, now_s))
 
     def turn(self, now_s: float) -> None:

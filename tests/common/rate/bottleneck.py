@@ -112,7 +112,7 @@ class _Sides:
                 self._operator.arrived(content, self._there_s(now_s))
             elif kind in self._joining:
                 is_piece, payload = content
-                whole = self._joining[kind].take(payload) if is_piece else payload
+                whole = self._joining[kind].add(payload) if is_piece else payload
                 if whole is not None and kind == "video":
                     self.ran.pictures.append((now_s, now_s - self._shown_s[whole[:8]]))
         for content in self._back.pop(now_s):

@@ -33,7 +33,7 @@ def test_what_is_paced_keeps_to_the_rate_and_arrives_as_it_was(turns: list[tuple
         for leaving in budget.take(now_s):
             size = on_the_wire(len(leaving.payload))
             paced_bytes, largest_bytes = paced_bytes + size, max(largest_bytes, size)
-            arrived = joining[leaving.stream].take(leaving.payload) if leaving.is_piece else leaving.payload
+            arrived = joining[leaving.stream].add(leaving.payload) if leaving.is_piece else leaving.payload
             assert arrived is None or arrived in offered
         assert budget.level_bytes <= SLICE_S * budget.controller.rate_bit_s / 8.0
         assert budget.left_bit_s > 0.0
@@ -70,10 +70,10 @@ def test_a_whole_that_has_begun_is_finished_and_one_that_has_not_gives_way() -> 
     wholes = [bytes([number]) * 5000 for number in range(5)]
     budget.offer("video", wholes[0], 0.0)
     assert budget.take(0.0) == []
-    arrived = [joining.take(leaving.payload) for leaving in budget.take(0.01)]
+    arrived = [joining.add(leaving.payload) for leaving in budget.take(0.01)]
     for whole in wholes[1:]:
         budget.offer("video", whole, 0.01)
-    arrived += [joining.take(leaving.payload) for turn in range(11, 300) for leaving in budget.take(1e-3 * turn)]
+    arrived += [joining.add(leaving.payload) for turn in range(11, 300) for leaving in budget.take(1e-3 * turn)]
 
     assert [whole for whole in arrived if whole is not None] == [wholes[0], *wholes[-2:]]
     assert budget.held_back()["video"] == {"rate": 2, "queue": 0}

@@ -18,7 +18,7 @@ def test_a_whole_comes_together_in_any_order(whole: bytes, size: int, number: in
     parts = pieces(whole, number, size)
     chance.shuffle(parts)
 
-    assert [joining.take(part) for part in parts] == [None] * (len(parts) - 1) + [whole]
+    assert [joining.add(part) for part in parts] == [None] * (len(parts) - 1) + [whole]
     assert joining.rejected == joining.incomplete == 0
 
 
@@ -30,7 +30,7 @@ def test_what_misses_a_piece_is_dropped_and_the_others_arrive(wholes: list[bytes
         parts = pieces(whole, number, 150)
         if loses:
             del parts[chance.randrange(len(parts))]
-        arrived += [out for part in parts if (out := joining.take(part)) is not None]
+        arrived += [out for part in parts if (out := joining.add(part)) is not None]
 
     assert arrived == [whole for whole, loses in zip(wholes, lost, strict=True) if not loses]
     assert sum(lost) - 2 <= joining.incomplete <= sum(lost)
@@ -40,7 +40,7 @@ def test_what_misses_a_piece_is_dropped_and_the_others_arrive(wholes: list[bytes
 def test_whatever_comes_memory_is_bounded(payloads: list[bytes]) -> None:
     joining = Joining(1000)
     for payload in payloads:
-        whole = joining.take(payload)
+        whole = joining.add(payload)
         assert whole is None or len(whole) <= 1000
     assert len(joining._begun) <= 2
 
@@ -57,10 +57,10 @@ def test_hostile_pieces_are_rejected() -> None:
         piece_of(whole + b"longer", 1, 512, 512),
     ):
         joining = Joining(LIMIT_BYTES)
-        assert joining.take(first) is None
-        assert joining.take(hostile) is None
+        assert joining.add(first) is None
+        assert joining.add(hostile) is None
         assert joining.rejected == 1
-        assert joining.take(second) == whole
+        assert joining.add(second) == whole
     overlapping = Joining(LIMIT_BYTES)
-    assert [overlapping.take(piece_of(whole, 1, offset, 512)) for offset in (0, 256, 512)] == [None, None, None]
+    assert [overlapping.add(piece_of(whole, 1, offset, 512)) for offset in (0, 256, 512)] == [None, None, None]
     assert overlapping.rejected == 1

@@ -22,13 +22,13 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
     file = RecordingFile(path, 1.7e9)
     content = Content(file)
     for source, side in enumerate(("robot", "operator")):
-        content.take(source, HEADER + as_json({"side": side, "settings": {"seed": 0}, "epoch": 1}))
+        content.write(source, HEADER + as_json({"side": side, "settings": {"seed": 0}, "epoch": 1}))
     for number in range(60):
         for source, late_s in enumerate((0.0, 0.4)):
             now_s = 0.05 * (number // 3) - late_s + 1.0
             inside = entry(Kind.RECEIVED, now_s, b"\0", bytes(range(number)))
-            content.take(source, BLOCK + pack_block(number, 0, now_s, now_s, inside))
-            content.take(source, STATUS + stamped(now_s) + as_json({"state": "armed", "late_us": number}))
+            content.write(source, BLOCK + pack_block(number, 0, now_s, now_s, inside))
+            content.write(source, STATUS + stamped(now_s) + as_json({"state": "armed", "late_us": number}))
         if number % 20 == 19:
             file.flush()
     file.close()

@@ -28,14 +28,14 @@ def write_short(path: Path) -> list[int]:
     file = RecordingFile(path, 1.7e9)
     content, ends = Content(file), []
     generator = np.random.default_rng(0)
-    content.take(0, HEADER + as_json({"side": "robot", "settings": {"seed": 0}, "epoch": 1, "versions": {}}))
+    content.write(0, HEADER + as_json({"side": "robot", "settings": {"seed": 0}, "epoch": 1, "versions": {}}))
     for second in range(SECONDS):
         for part in range(BLOCKS_A_SECOND):
             number, now_s = BLOCKS_A_SECOND * second + part, second + part / BLOCKS_A_SECOND
             inside = entry(Kind.RECEIVED, now_s, b"\0", generator.bytes(40))
-            content.take(0, BLOCK + pack_block(number, 0, now_s, now_s, inside))
-        content.take(0, STATUS + stamped(now_s) + as_json({"state": "armed", "loop_age_ms": float("nan")}))
-        content.take(0, NOTE + stamped(now_s) + b"a note")
+            content.write(0, BLOCK + pack_block(number, 0, now_s, now_s, inside))
+        content.write(0, STATUS + stamped(now_s) + as_json({"state": "armed", "loop_age_ms": float("nan")}))
+        content.write(0, NOTE + stamped(now_s) + b"a note")
         file.flush()
         ends.append(file.kept_bytes)
     file.close()
@@ -190,13 +190,13 @@ def test_a_scene_is_drawn_once_and_moved(tmp_path: Path) -> None:
     path = tmp_path / "scene.mcap"
     file = RecordingFile(path, 1.7e9)
     content = Content(file)
-    content.take(0, HEADER + as_json({"side": "robot"}))
+    content.write(0, HEADER + as_json({"side": "robot"}))
     for number in range(3):
         header = Header(1, 2 * number + 1, 1.0)
         scene = SceneShapes(header, 1, ("hand",), ("post",), shapes)
         state = scene_state(Header(1, 2 * number + 2, 1.0))
         for message in (scene, state):
-            content.take(0, VIEW + stamped(1.0 + number) + encode(message))
+            content.write(0, VIEW + stamped(1.0 + number) + encode(message))
     file.close()
     recording = open_recording(path)
     assert len(list(recording.messages(["/scene"]))) == 1

@@ -38,7 +38,7 @@ def test_what_is_no_recording(command: Callable[[Sequence[str]], int], tmp_path:
 def test_wrong_content_in_a_right_file_is_one_line(tmp_path: Path) -> None:
     path = tmp_path / "odd.mcap"
     file = RecordingFile(path, 0.0)
-    Content(file).take(0, HEADER + as_json({"side": "robot"}))
+    Content(file).write(0, HEADER + as_json({"side": "robot"}))
     file.write("/robot/inputs", 0.0, b"no block")
     file.close()
     for command in COMMANDS[1:]:
@@ -49,8 +49,8 @@ def test_a_recording_with_nothing_for_a_command_is_refused(tmp_path: Path) -> No
     path = tmp_path / "notes.mcap"
     file = RecordingFile(path, 0.0)
     content = Content(file)
-    content.take(0, HEADER + as_json({"side": "robot", "settings": {}, "epoch": 1, "clock_domain": ""}))
-    content.take(0, NOTE + stamped(1.0) + b"listening")
+    content.write(0, HEADER + as_json({"side": "robot", "settings": {}, "epoch": 1, "clock_domain": ""}))
+    content.write(0, NOTE + stamped(1.0) + b"listening")
     file.close()
     asked = [(one, [str(path)]) for one in COMMANDS]
     for command, arguments in (*asked, (replay, [str(path), "--check"])):

@@ -58,7 +58,7 @@ def record_loopback(
     }
     status: dict[str, Callable[[float], SideStatus]] = {"robot": run.robot.status, "operator": run.operator.status}
     for source, side in enumerate(notes):
-        content.take(source, HEADER + as_json({"side": side, **headers[side]}))
+        content.write(source, HEADER + as_json({"side": side, **headers[side]}))
     for number in range(round(duration_s / _BLOCK_S)):
         now_s = (number + 1) * _BLOCK_S
         for due_s in [due_s for due_s in left if due_s < now_s]:
@@ -71,10 +71,10 @@ def record_loopback(
                 for noted in notes[side]
             )
             notes[side].clear()
-            content.take(source, BLOCK + pack_block(number, 0, now_s - _BLOCK_S, now_s, entries))
+            content.write(source, BLOCK + pack_block(number, 0, now_s - _BLOCK_S, now_s, entries))
             for view in views:
-                content.take(source, VIEW + view)
-            content.take(source, STATUS + stamped(now_s) + as_json(status[side](now_s)))
+                content.write(source, VIEW + view)
+            content.write(source, STATUS + stamped(now_s) + as_json(status[side](now_s)))
         if number % _FLUSH_BLOCKS == _FLUSH_BLOCKS - 1:
             file.flush()
     file.close()
@@ -109,7 +109,7 @@ def record_pictures(
     """Record the run's messages again into `path`, with pictures, and with marks of episodes at these times."""
     file = RecordingFile(path, 0.0)
     content = Content(file)
-    content.take(0, HEADER + as_json({"side": "robot", **run.headers["robot"]}))
+    content.write(0, HEADER + as_json({"side": "robot", **run.headers["robot"]}))
     payloads: list[bytes] = []
     next_s = 0.0
     began_ns = run.began_ns
@@ -119,11 +119,11 @@ def record_pictures(
             header = Header(epoch=1, sequence=len(payloads) + 1, sent_s=now_s)
             frame = VideoFrame(header, "overview", now_s - 0.02, 32, 24, jpeg(10 * len(payloads) % 256))
             payloads.append(encode(frame))
-            content.take(0, VIEW + stamped(now_s) + payloads[-1])
+            content.write(0, VIEW + stamped(now_s) + payloads[-1])
             next_s += 0.1
         file.write(message.topic, now_s, message.content)
     for time_s, mark in marks:
         file.write("/episode", time_s, as_json({"time_s": time_s, "side": "robot", "mark": mark}))
-    content.take(0, FACTS + stamped(now_s) + b'{"now_s":1.0}')
+    content.write(0, FACTS + stamped(now_s) + b'{"now_s":1.0}')
     file.close()
     return open_recording(path), payloads

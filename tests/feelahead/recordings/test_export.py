@@ -166,10 +166,10 @@ def operators(path: Path, *frames: tuple[float, float | None, VideoFrame]) -> Re
     """Record frames at an operator side alone, each at its time, with the clock's offset that is known by then."""
     file = RecordingFile(path, 0.0)
     content = Content(file)
-    content.take(0, HEADER + as_json({"side": "operator"}))
+    content.write(0, HEADER + as_json({"side": "operator"}))
     for now_s, offset_s, frame in frames:
-        content.take(0, STATUS + stamped(now_s) + as_json({"offset_s": offset_s}))
-        content.take(0, VIEW + stamped(now_s) + encode(frame))
+        content.write(0, STATUS + stamped(now_s) + as_json({"offset_s": offset_s}))
+        content.write(0, VIEW + stamped(now_s) + encode(frame))
     file.close()
     return open_recording(path)
 

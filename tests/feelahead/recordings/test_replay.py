@@ -208,11 +208,11 @@ def test_differences_are_measured(run: Recording) -> None:
     ways = (field.fast_m[0] - STEP_M, *field.fast_m[1:])
     closer = msgspec.structs.replace(message, r2=msgspec.structs.replace(field, fast_m=ways))
     compared = Comparison("robot", "messages")
-    compared.take(payload, encode(closer))
+    compared.compare(payload, encode(closer))
     assert (compared.made, compared.equal) == (1, 0)
     assert compared.worst_m == STEP_M
     assert compared.worst_eighths == 0.0
-    compared.take(payload, None)
+    compared.compare(payload, None)
     assert compared.worst_eighths == math.inf
     assert not compared.within
 

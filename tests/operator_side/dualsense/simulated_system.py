@@ -108,7 +108,7 @@ class SimulatedSystem:
             self.failing -= 1
             return False
         if device in self.devices.values():
-            device.take_report(report, self.clock.now())
+            device.apply_report(report, self.clock.now())
         return device in self.devices.values()
 
     def enumerate(self, vendor_id: int, product_id: int) -> list[dict[str, Any]]:

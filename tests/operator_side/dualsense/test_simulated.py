@@ -122,7 +122,7 @@ def test_a_report_that_cannot_be_read_changes_nothing(transport: Transport) -> N
         (build_output_report(STIFF, other), f"of another transport; valid: a report for {transport.value}"),
     ):
         with pytest.raises(ValueError, match=message):
-            device.take_report(report, 0.1)
+            device.apply_report(report, 0.1)
     assert device.strengths == (STIFF.l2, STIFF.r2)
 
 

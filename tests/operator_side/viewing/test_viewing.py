@@ -201,9 +201,9 @@ def test_a_picture_that_is_lacking_is_asked_for_at_once_and_then_four_times_a_se
 
 def test_pictures_and_scenes_go_to_the_console_and_the_rest_to_the_core() -> None:
     looking = Looking()
-    assert looking.viewing.take(VIDEO_TOPIC, b"a picture", 1.0)
-    assert looking.viewing.take(SCENE_TOPIC, b"a scene", 1.0)
-    assert not looking.viewing.take(b"telemetry", b"a view", 1.0)
+    assert looking.viewing.receive(VIDEO_TOPIC, b"a picture", 1.0)
+    assert looking.viewing.receive(SCENE_TOPIC, b"a scene", 1.0)
+    assert not looking.viewing.receive(b"telemetry", b"a view", 1.0)
     assert looking.console.views == [(b"a picture", True), (b"a scene", False)]
 
 
@@ -212,7 +212,7 @@ def test_without_a_console_nothing_is_asked_for_and_pictures_are_passed_over() -
     viewing = Viewing(bench.side, surroundings, Status("none", "test"), DrivingPage(), None)
     assert viewing.requests(1.0) == []
     assert not viewing.facts_due(1.0)
-    assert viewing.take(VIDEO_TOPIC, b"a picture", 1.0)
+    assert viewing.receive(VIDEO_TOPIC, b"a picture", 1.0)
     assert view_topics(OperatorSettings()) == (b"telemetry",)
     assert set(view_topics(OperatorSettings(console=True))) == {b"telemetry", VIDEO_TOPIC, SCENE_TOPIC}
 
@@ -237,11 +237,11 @@ def test_overlaps_of_the_trigger_with_more_and_ticks_are_read_from_the_newest_sc
     assert isinstance(scene, SceneState)
     scene = msgspec.structs.replace(scene, overlaps=((0, 1e-6, 2e-6), (3, 0.5e-6, 0.0)), overruns=3, tick_p50_us=60.0)
     for commanded, overlap_mm3 in ((scene, 2000.0), (msgspec.structs.replace(scene, overlaps=()), 0.0)):
-        figures.take(encode(commanded))
+        figures.receive(encode(commanded))
         expected = (overlap_mm3, 60.0, 130.0, 3)
         # Shapes and broken payloads change nothing.
         for payload in (None, shapes(), encode(scene)[:-3], b"", b"scene"):
             if payload is not None:
-                figures.take(payload)
+                figures.receive(payload)
             assert (found := figures.newest) is not None
             assert msgspec.structs.astuple(found) == pytest.approx(expected)

@@ -105,6 +105,6 @@ def _throw(parts: SceneParts) -> None:
 )
 def test_what_a_driver_moves_is_not_put_back(settings: RobotSettings, why: str) -> None:
     episodes = build_parts(settings, 1, "clock").session.episodes
-    assert episodes.take("reset", owns=True, armed=False) == why
-    assert episodes.take("start", owns=True, armed=False) == ""
+    assert episodes.mark("reset", owns=True, armed=False) == why
+    assert episodes.mark("start", owns=True, armed=False) == ""
     assert episodes.take_accepted() == ["start"]

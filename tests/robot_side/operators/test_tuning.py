@@ -107,7 +107,7 @@ def test_what_was_tuned_when_is_in_the_summary() -> None:
     tuning = Tuning(0.99, asked.append)
     tuning.begin(10.0)
     tuning.begin(11.0)
-    assert tuning.take(Tune(Header(1, 1, 0.0), 1, 0.9, "delay 20ms"), 12.5, owns=True)
+    assert tuning.grant(Tune(Header(1, 1, 0.0), 1, 0.9, "delay 20ms"), 12.5, owns=True)
     assert asked == [0.9]
     assert tuning.summary()["granted"] == [{"time_s": 2.5, "probability": 0.9, "link": "delay 20ms"}]
     assert (tuning.take_link(), tuning.take_link()) == ("delay 20ms", None)

@@ -36,7 +36,7 @@ def test_haptics_leave_in_every_turn_while_a_picture_leaves_piece_by_piece() -> 
     assert sockets.sent == [(b"peer", b"h%d" % turn) for turn in range(1, 900)]
     assert {topic for topic, _ in sockets.published} == {b"video" + PIECE}
     joining = Joining(1 << 20)
-    assert [joining.take(piece) for _, piece in sockets.published] == [None] * (len(sockets.published) - 1) + [PICTURE]
+    assert [joining.add(piece) for _, piece in sockets.published] == [None] * (len(sockets.published) - 1) + [PICTURE]
     assert max(len(piece) for _, piece in sockets.published) <= 1.25 * 0.006 * 1e6 / 8.0 + 12
     assert sending.backlog_s("video", 0.9) == 0.0
     assert sending.next_due() is None

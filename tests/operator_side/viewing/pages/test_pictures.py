@@ -53,7 +53,7 @@ class Watched:
                         self._under_way.append((self._captured_s + delay_s, encode(frame)))
             for due_s, payload in self._under_way:
                 if due_s <= bench.now_s:
-                    self.pictures.take(payload, bench.now_s)
+                    self.pictures.receive(payload, bench.now_s)
             self._under_way = [one for one in self._under_way if one[0] > bench.now_s]
             shown = None if self.shown is None else self.shown(bench.now_s)
             self.pictures.follow(bench.side, None if shown is None else bench.now_s - shown, bench.now_s)
@@ -106,7 +106,7 @@ def test_another_clock_of_a_robot_side_started_anew_is_followed_and_what_is_brok
     for captured_s in (500.0, 500.05, 3.0, 3.05):
         payload = encode(VideoFrame(bench.robot.stamp(1.0), FIRST, captured_s, 8, 8, b"1"))
         for one in (payload, payload[:-1], b""):
-            pictures.take(one, captured_s)
+            pictures.receive(one, captured_s)
     pictures.follow(bench.side, None, 3.06)
     assert pictures.facts().dead_s[0] == 0.5
     assert pictures.hands == 1.0

@@ -167,7 +167,7 @@ def lerobot_turns(arm: Any, since_s: float, turns: int, command: dict[str, Any] 
         now_s = since_s + 0.02 * turn
         state = arm.measure(now_s)
         if command is not None:
-            arm.take(command)
+            arm.obey(command)
         arm.move(now_s)
     return state
 
