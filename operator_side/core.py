@@ -112,7 +112,7 @@ class OperatorSide:
         if isinstance(message, StiffnessUpdate):
             self._feel(message, arrival, now_s)
         elif isinstance(message, LeaseNotice) and arrival.fresh:
-            self._follow(message, now_s)
+            self._read_notice(message, now_s)
 
     def _feel(self, update: StiffnessUpdate, arrival: Arrival, now_s: float) -> None:
         if not arrival.copy:
@@ -124,13 +124,13 @@ class OperatorSide:
             self.newest_stiffness.apply(update, arrival, now_s)
             self.hands.see(armed=update.state == "armed", now_s=now_s)
 
-    def _follow(self, notice: LeaseNotice, now_s: float) -> None:
-        if self._standing.follow(notice, now_s):
+    def _read_notice(self, notice: LeaseNotice, now_s: float) -> None:
+        if self._standing.read(notice, now_s):
             self.link.begin_epoch()
         if not self._standing.owns:
             self._blindness.end()
             self.commands.stop_button.forget()
-        self.marker.follow(notice, now_s)
+        self.marker.read(notice, now_s)
 
     def receive_view(self, payload: bytes, now_s: float) -> None:
         """Take one view payload; keep it if it is the newest telemetry of the robot side's present epoch."""

@@ -18,7 +18,7 @@ class StoredTravel:
         self._calibrated = 0
         self._reported: set[str] = set()
 
-    def follow(self) -> None:
+    def load(self) -> None:
         """Load the calibration of a newly found controller; call it in every turn of the loop.
 
         If the stored calibration is invalid: ConfigurationError for the run's first controller, a note for later ones.

@@ -97,7 +97,7 @@ class OperatorTurns:
     def turn(self, now_s: float) -> None:
         """Read the controller, and queue commands and requests."""
         core, connection = self._core, self._connection
-        self._pages.follow(core, now_s)
+        self._pages.apply(core, now_s)
         # First, so that the tuning request, sent over the new link, arrives after all messages of the old one.
         if (words := core.tuner.take_link()) is not None:
             self._sending.tune(words)
@@ -108,7 +108,7 @@ class OperatorTurns:
         connection.update(now_s)
         self._say_what_is_new()
         if self._travel is not None:
-            self._travel.follow()
+            self._travel.load()
         if (state := connection.read(now_s)) is not None:
             core.read_state(state, now_s)
         self._sending.push([*core.motion(now_s), *map(ToRobot, self._viewing.requests(now_s))], now_s)

@@ -82,7 +82,7 @@ def resolve(host: str, text: str, flag: str) -> tuple[str, bool]:
     return str(found[0][4][0]), True
 
 
-def following(control: Endpoint, text: str, flag: str) -> Endpoint:
+def view_after(control: Endpoint, text: str, flag: str) -> Endpoint:
     """Return the view's default endpoint: the port after the control port; if that is 0 (any port), also 0."""
     if control.port == _HIGHEST_PORT:
         raise ConfigurationError(

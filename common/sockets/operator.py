@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import zmq
 
 from common.sockets.authentication import HandshakeWatch, OperatorKeys
-from common.sockets.endpoints import Endpoint, following, parse_connect
+from common.sockets.endpoints import Endpoint, parse_connect, view_after
 from common.sockets.inbox import Inbox
 from common.sockets.round_robin import (
     CONNECTIONS,
@@ -70,7 +70,7 @@ class OperatorSockets(SocketShell):
             raise ValueError(f"connections = {connections}; valid: 1 to {MOST_CONNECTIONS_EACH}")
         control = parse_connect(connect, "--connect")
         view = (
-            following(control, connect, "--view-connect")
+            view_after(control, connect, "--view-connect")
             if view_connect is None
             else parse_connect(view_connect, "--view-connect")
         )

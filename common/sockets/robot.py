@@ -8,7 +8,7 @@ import zmq
 from common.errors import ConfigurationError
 from common.sockets.authentication import Authenticator, RobotKeys
 from common.sockets.descriptors import shut_down
-from common.sockets.endpoints import Endpoint, following, parse_bind, refuse_open
+from common.sockets.endpoints import Endpoint, parse_bind, refuse_open, view_after
 from common.sockets.gate import Gate
 from common.sockets.inbox import Inbox
 from common.sockets.peers import Connection, Peers
@@ -56,7 +56,7 @@ class RobotSockets(SocketShell):
         with neither `keys` nor `insecure`.
         """
         control = parse_bind(bind, "--bind")
-        view = following(control, bind, "--view-bind") if view_bind is None else parse_bind(view_bind, "--view-bind")
+        view = view_after(control, bind, "--view-bind") if view_bind is None else parse_bind(view_bind, "--view-bind")
         if keys is None and not insecure:
             refuse_open(control, bind, "--bind")
             refuse_open(view, view_bind or bind, "--view-bind")

@@ -30,9 +30,9 @@ class Steps:
         first, second = (view.lacks if (view := self._views.get(name)) else 0 for name in VIEW_NAMES)
         return first, second
 
-    def follow(self, step: VideoStep) -> VideoFrame | None:
+    def decode(self, step: VideoStep) -> VideoFrame | None:
         """Return the picture as JPEG; None if the previous picture is missing, or the bytes are invalid."""
-        jpeg = self._views.setdefault(step.view, _View()).follow(step)
+        jpeg = self._views.setdefault(step.view, _View()).decode(step)
         if jpeg is None:
             return None
         return VideoFrame(step.header, step.view, step.captured_s, step.width, step.height, jpeg)
@@ -45,7 +45,7 @@ class _View:
         self._decoder: VideoCodecContext | None = None
         self._encoder: VideoCodecContext | None = None
 
-    def follow(self, step: VideoStep) -> bytes | None:
+    def decode(self, step: VideoStep) -> bytes | None:
         if step.whole:
             self._decoder = _decoder()
         elif step.number != self._number + 1:

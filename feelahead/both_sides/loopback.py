@@ -150,7 +150,7 @@ class Loopback:
             self.operator.receive_view(payload, now_s)
 
     def _operator_tick(self, now_s: float) -> None:
-        self.pages.follow(self.operator, now_s)
+        self.pages.apply(self.operator, now_s)
         if (words := self.operator.tuner.take_link()) is not None:
             self._there = tuned_link(self._there, words)
             self._to_robot.change(self._there.profile("to_robot"))

@@ -56,7 +56,7 @@ class BackgroundWrites:
         """Queue `feel` for the thread; DeviceError if an earlier write has failed."""
         self._raise_failure()
         with self._changed:
-            self._waiting = feel if self._waiting is None else feel.following(self._waiting)
+            self._waiting = feel if self._waiting is None else feel.completed_from(self._waiting)
             self._now_s = now_s
             self._changed.notify()
 

@@ -68,7 +68,7 @@ class Feel:
         if self.light is not None:
             check_limits(self)
 
-    def following(self, before: "Feel") -> "Feel":
+    def completed_from(self, before: "Feel") -> "Feel":
         """Return these effects; where a part is None, take it from `before`, which was set earlier."""
         pairs = zip(_parts(self), _parts(before), strict=True)
         return Feel(*(old if new is None else new for new, old in pairs))

@@ -130,7 +130,7 @@ class EvdevPad:
     def write(self, feel: Feel, now_s: float) -> None:
         """Render `feel` as rumble from now on; a light is ignored."""
         self._node.open()
-        self._commanded = feel.following(self._commanded)
+        self._commanded = feel.completed_from(self._commanded)
         self._shake(now_s)
 
     def close(self) -> None:

@@ -38,7 +38,7 @@ class Choices:
         self._camera_turn_rad: float | None = None
         """Newest angle that was computed for the same side of the camera as `_mirrored` says"""
 
-    def follow(self, intent: OperatorIntent) -> None:
+    def read(self, intent: OperatorIntent) -> None:
         """Take the buttons of the newest intent."""
         speed, frame = self._pressed
         if intent.next_speed and not speed:

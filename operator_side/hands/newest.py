@@ -27,7 +27,7 @@ class NewestIntent:
         """Take a controller's state and return the intent made from it."""
         self.intent = intent = operator_intent(state, self.calibration, swap_sides=self._swap_sides)
         self._read_s = now_s
-        self.choices.follow(intent)
+        self.choices.read(intent)
         return intent
 
     def lose(self, now_s: float) -> None:

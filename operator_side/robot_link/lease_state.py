@@ -39,7 +39,7 @@ class LeaseState:
         """Whether we have the lease, so that our commands count."""
         return self.lease is not None and self.lease.session in OWNING
 
-    def follow(self, notice: LeaseNotice, now_s: float) -> bool:
+    def read(self, notice: LeaseNotice, now_s: float) -> bool:
         """Take a notice; return whether we must begin a new epoch, because the robot side has ended our session."""
         restarted = now_s - self._anew_s < _NEW_EPOCH_S
         known = None if self.lease is None else self.lease.session

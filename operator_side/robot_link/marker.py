@@ -68,7 +68,7 @@ class Marker:
         number, kind, _ = self._waiting[0]
         return Mark(link_end.stamp(now_s), number, kind)
 
-    def follow(self, notice: LeaseNotice, now_s: float) -> None:
+    def read(self, notice: LeaseNotice, now_s: float) -> None:
         """Take a notice, which may answer the oldest mark."""
         if not self._waiting or notice.marked != self._waiting[0][0]:
             return

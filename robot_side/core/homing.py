@@ -67,7 +67,7 @@ class Homing:
         self._place, self._next_s = 0, -math.inf
         self._free = False
 
-    def follow(
+    def velocity(
         self,
         command: MotionCommand | None,
         state: ArmState,

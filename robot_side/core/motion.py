@@ -37,7 +37,7 @@ class Motion:
         self._arm, self._limits, self._settings, self._assists = arm, limits, settings, assists
         self._still: FloatArray = np.zeros(arm.joint_count)
 
-    def follow(
+    def command(
         self,
         permission: Permission,
         pose: GripperPose,
@@ -49,7 +49,7 @@ class Motion:
     ) -> None:
         """Command the arm; stop it if there is no permission.
 
-        sensed: the law's result in the tick before. homeward: result of `Homing.follow`, instead of the command.
+        sensed: the law's result in the tick before. homeward: result of `Homing.velocity`, instead of the command.
         """
         command = permission.command
         if command is None or grip.touchdown.gives_way:

@@ -107,15 +107,15 @@ class RobotSide:
         objects = sight.see(now_s) if sight.frame is None else sight.frame
         if self.session.take_next_target() and grip.held is None:
             sight.choose_next(objects, pose.tool_position_m, pose.tool_rotation[:, 2])
-        grip.follow(objects, pose, state, self.motion.rises_m_s)
+        grip.update(objects, pose, state, self.motion.rises_m_s)
         whole = grip.joined(pose)
         begin("motion")
         permission = self.session.permission(now_s)
         before = None if self.newest is None else self.newest[0]
         homeward = None
         if self.homing is not None and before is not None:
-            homeward = self.homing.follow(permission.command, state, grip, objects, before.enlargement_m)
-        self.motion.follow(permission, pose, state, grip, before, now_s, homeward)
+            homeward = self.homing.velocity(permission.command, state, grip, objects, before.enlargement_m)
+        self.motion.command(permission, pose, state, grip, before, now_s, homeward)
         begin("law")
         command = permission.command
         situation = Situation(

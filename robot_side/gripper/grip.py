@@ -34,7 +34,7 @@ class Grip:
         """Hold nothing."""
         self.held, self.touchdown = None, Touchdown()
 
-    def follow(self, objects: PerceivedObjects, pose: GripperPose, state: ArmState, rises_m_s: float) -> None:
+    def update(self, objects: PerceivedObjects, pose: GripperPose, state: ArmState, rises_m_s: float) -> None:
         """Detect grip, release and touchdown of an object.
 
         rises_m_s: commanded speed of the tool upwards since the last call.

@@ -23,7 +23,7 @@ class PerceivedModel(SceneModel):
         self._frame: PerceivedObjects | None = None
         self._known: tuple[object, ...] = ()
 
-    def follow(self, objects: PerceivedObjects) -> bool:
+    def update(self, objects: PerceivedObjects) -> bool:
         """Take a frame's objects; return whether the objects or their shapes differ from the last frame's."""
         if objects is self._frame:
             return False

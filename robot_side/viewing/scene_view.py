@@ -90,7 +90,7 @@ class SceneView:
 
     def outdated(self, objects: PerceivedObjects) -> bool:
         """Return whether this frame has other objects or shapes than the frame before."""
-        return self._model.follow(objects)
+        return self._model.update(objects)
 
     def begin_shapes(self, header: Header, situation: Situation) -> None:
         """Begin to make SceneShapes anew, with the objects nearest to the tool first."""

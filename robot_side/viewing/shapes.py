@@ -48,7 +48,7 @@ class SceneModel:
         self._geoms = [thing.geoms for thing in scene.objects]
         self._start = scene.data.geom_xpos.copy(), scene.data.geom_xmat.reshape(-1, 3, 3).copy()
 
-    def follow(self, objects: PerceivedObjects) -> bool:
+    def update(self, objects: PerceivedObjects) -> bool:
         """Return whether a frame has other objects than before: never, because a scene's objects stay the same."""
         del objects
         return False

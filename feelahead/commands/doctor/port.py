@@ -9,7 +9,7 @@ from typing import Final
 from common.clock import MonotonicClock
 from common.errors import ConfigurationError
 from common.sockets.authentication import OperatorKeys
-from common.sockets.endpoints import Endpoint, following, resolve, split_connect
+from common.sockets.endpoints import Endpoint, resolve, split_connect, view_after
 from common.sockets.greeting import GREETING_BYTES, KNOCK, mechanism_of
 
 _CONNECT_LIMIT_S: Final = 4.0
@@ -40,7 +40,7 @@ class RobotAddress:
         """Read the addresses, without looking their names up; raises ConfigurationError for an invalid address."""
         control = Endpoint(*split_connect(connect, "--connect"), ipv6=False)
         if view_connect is None:
-            return cls(control, following(control, connect, "--view-connect"), keys)
+            return cls(control, view_after(control, connect, "--view-connect"), keys)
         return cls(control, Endpoint(*split_connect(view_connect, "--view-connect"), ipv6=False), keys)
 
 

@@ -162,7 +162,7 @@ class HidDualSense:
         report = self._packed(feel)
         self._written, self._released = True, False
         _write(self._writing, report)
-        self._commanded = feel.following(self._commanded)
+        self._commanded = feel.completed_from(self._commanded)
         self._released = self._commanded.releases
 
     def close(self) -> None:

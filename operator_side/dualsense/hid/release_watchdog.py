@@ -69,7 +69,7 @@ class Watch:
         """Return the seconds left until the next beat must come; None if no beat is due."""
         return None if self._deadline_s is None else max(0.0, self._deadline_s - now_s)
 
-    def follow(self, line: bytes, now_s: float) -> None:
+    def execute(self, line: bytes, now_s: float) -> None:
         """Execute one line of the input; ignore an unknown one."""
         words = line.split()
         if words == [b"beat"]:
@@ -113,7 +113,7 @@ def watch(input_file: int, answer_file: int) -> None:
             break
         *lines, unfinished = (unfinished + chunk).split(b"\n")
         for line in lines:
-            watched.follow(line, time.monotonic())
+            watched.execute(line, time.monotonic())
     # An incomplete last line is ignored.
     watched.release()
 

@@ -195,7 +195,7 @@ class SimulatedDualSense:
             raise DeviceError("the simulated controller is closed; open a new one")
 
     def _apply(self, feel: Feel) -> None:
-        self.commanded = feel.following(self.commanded)
+        self.commanded = feel.completed_from(self.commanded)
         self._l2.set_strengths(self.commanded.l2 or FREE_TRIGGER)
         self._r2.set_strengths(self.commanded.r2 or FREE_TRIGGER)
 

@@ -167,7 +167,7 @@ class _Process:
     def _view(self, payload: bytes) -> SceneState | None:
         seen: AnyViewMessage | None = decode_view(payload)
         if isinstance(seen, VideoStep):
-            seen = None if self._steps is None else self._steps.follow(seen)
+            seen = None if self._steps is None else self._steps.decode(seen)
             self._say_what_lacks()
         if isinstance(seen, VideoFrame):
             before = _FRAME.pack(VIEW_NAMES.index(seen.view), seen.captured_s)

@@ -111,7 +111,7 @@ class BrowserHands:
     def write(self, feel: Feel, now_s: float) -> None:
         """Store `feel`; a page has nothing to write it to."""
         del now_s
-        self._commanded = feel.following(self._commanded)
+        self._commanded = feel.completed_from(self._commanded)
 
     def close(self) -> None:
         """Store the release: there is no device to close."""
@@ -139,8 +139,8 @@ class BrowserHands:
         """Return the raw travels of L2 and R2 to which keys that ask for `asked` pull them."""
         l2, r2 = self._pulls
         travels = (
-            l2.follow(asked[0], self._commanded.l2 or FREE_TRIGGER, passed_s),
-            r2.follow(asked[1], self._commanded.r2 or FREE_TRIGGER, passed_s),
+            l2.travel(asked[0], self._commanded.l2 or FREE_TRIGGER, passed_s),
+            r2.travel(asked[1], self._commanded.r2 or FREE_TRIGGER, passed_s),
         )
         self._pages.yields = (l2.yields, r2.yields)
         return travels

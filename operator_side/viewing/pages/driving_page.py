@@ -121,9 +121,9 @@ class DrivingPage:
         given, self._give_back = self._give_back, False
         return given
 
-    def follow(self, core: OperatorSide, now_s: float) -> None:
+    def apply(self, core: OperatorSide, now_s: float) -> None:
         """Apply the pages' emergency stops, tuning requests and marks; call it in every turn of the loop."""
-        self.pictures.follow(core, None if self._newest is None else self._newest.shown_s, now_s)
+        self.pictures.update(core, None if self._newest is None else self._newest.shown_s, now_s)
         if self.stopping(now_s):
             core.press_stop(now_s)
         while self.wishes:
@@ -151,7 +151,7 @@ class DrivingPage:
         self._choose(page, hands)
         if page == self._driver:
             self._newest, self._heard_s = hands, now_s
-            self._follow(hands, now_s)
+            self._advance(hands, now_s)
 
     def _choose(self, page: int, hands: PageHands) -> None:
         """Update the driving page by this message. No page can take over from a page that drives."""
@@ -170,13 +170,13 @@ class DrivingPage:
             # A refused page must stop asking before it may ask again, so that it does not drive by surprise later.
             self._refused.add(page)
 
-    def _follow(self, hands: PageHands, now_s: float) -> None:
+    def _advance(self, hands: PageHands, now_s: float) -> None:
         match self.doing:
             case Doing.ALL_KEYS_UP_FIRST:
                 since_s = self._up_since_s
                 if since_s is not None and now_s - since_s >= REST_S:
                     self.doing = Doing.READY
-                    self._follow(hands, now_s)
+                    self._advance(hands, now_s)
                 elif self.reset_first or not hands.all_up:
                     self._up_since_s = None
                 elif since_s is None:

@@ -92,7 +92,7 @@ class Pictures:
         self._views = {name: _View() for name in VIEW_NAMES}
         self._old_s: dict[ViewName, float | None] = dict.fromkeys(VIEW_NAMES)
         self._control_p95_s: float | None = None
-        self._fresh_s = self._measured_s = self._followed_s = -math.inf
+        self._fresh_s = self._measured_s = self._updated_s = -math.inf
 
     def receive(self, payload: bytes, now_s: float) -> None:
         """Take a payload of the topic `video`; an invalid one is ignored."""
@@ -102,12 +102,12 @@ class Pictures:
                 size_bytes = len(seen.jpeg if isinstance(seen, VideoFrame) else seen.h264)
                 self._views[seen.view].note(seen.captured_s, size_bytes, now_s)
 
-    def follow(self, core: OperatorSide, shown_s: float | None, now_s: float) -> None:
+    def update(self, core: OperatorSide, shown_s: float | None, now_s: float) -> None:
         """Measure, and let the hands fade or return.
 
         shown_s: capture time of the picture that the driving page shows, on the robot side's clock; None if unknown.
         """
-        passed_s, self._followed_s = now_s - self._followed_s, now_s
+        passed_s, self._updated_s = now_s - self._updated_s, now_s
         if not math.isfinite(self._views[FIRST].came_s):
             return
         if now_s - self._measured_s >= _PERIOD_S:

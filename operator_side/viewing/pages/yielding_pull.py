@@ -18,7 +18,7 @@ class YieldingPull:
         """Whether a stiff zone kept the last pull below the travel that was asked for"""
         self._travel = 0.0
 
-    def follow(self, asked: float, strengths: Strengths, passed_s: float) -> float:
+    def travel(self, asked: float, strengths: Strengths, passed_s: float) -> float:
         """Return the raw travel, 0 to 1, `passed_s` after the last call. asked: raw travel that the key asks for."""
         stopped = max(strengths.count(0) / ZONE_COUNT, equilibrium_travel(YIELDING_FINGER_N, strengths)) / SENSED_TRAVEL
         self.yields = stopped < asked

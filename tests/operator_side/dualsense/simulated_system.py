@@ -148,11 +148,11 @@ class StallingWrites:
 
     def write(self, output: Feel, now_s: float) -> None:
         if not self._stalled():
-            self._device.write(output if self._waiting is None else output.following(self._waiting), now_s)
+            self._device.write(output if self._waiting is None else output.completed_from(self._waiting), now_s)
             self._waiting = None
             return
         self._since_s = now_s if self._waiting is None else self._since_s
-        self._waiting = output if self._waiting is None else output.following(self._waiting)
+        self._waiting = output if self._waiting is None else output.completed_from(self._waiting)
 
     def close(self) -> None:
         self._waiting, self._stuck = None, self._stalled()

@@ -226,9 +226,9 @@ def test_refused_strengths_are_named(strengths: Any, named: str) -> None:
 
 @given(OUTPUTS, OUTPUTS)
 def test_two_in_a_row_set_what_both_together_set_and_a_change_leads_there(first: Feel, second: Feel) -> None:
-    both = second.following(first)
+    both = second.completed_from(first)
     for part in fields(Feel):
         newer, older = getattr(second, part.name), getattr(first, part.name)
         assert getattr(both, part.name) == (older if newer is None else newer)
-    assert both.change_from(first).following(first) == both
+    assert both.change_from(first).completed_from(first) == both
     assert both.change_from(both) == Feel()

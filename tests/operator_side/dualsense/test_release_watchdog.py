@@ -106,25 +106,25 @@ def test_what_it_is_told_in_virtual_time(tmp_path: Path) -> None:
     with FakeController(tmp_path / "hidraw3") as controller, (tmp_path / "answers").open("wb", 0) as answers:
         watched = Watch(answers.fileno())
         hold = f"hold {controller.path.hex()} {REPORT.hex()}".encode()
-        watched.follow(b"beat", 1.0)  # Beat of an earlier hold.
-        watched.follow(hold, 1.0)
+        watched.execute(b"beat", 1.0)  # Beat of an earlier hold.
+        watched.execute(hold, 1.0)
         assert watched.patience_s(1.0) is None
-        watched.follow(b"beat", 2.0)
+        watched.execute(b"beat", 2.0)
         assert watched.patience_s(2.05) == pytest.approx(SILENCE_S - 0.05)
         assert watched.patience_s(3.0) == 0.0
-        watched.follow(b"nonsense", 3.0)
-        watched.follow(b"rest", 3.0)
+        watched.execute(b"nonsense", 3.0)
+        watched.execute(b"rest", 3.0)
         assert watched.patience_s(3.0) is None
-        watched.follow(b"beat", 4.0)
+        watched.execute(b"beat", 4.0)
         watched.release()
         assert (controller.written(0.0), watched.patience_s(4.0)) == (REPORT, None)
-        watched.follow(b"beat", 5.0)
-        watched.follow(b"let-go", 5.0)
+        watched.execute(b"beat", 5.0)
+        watched.execute(b"let-go", 5.0)
         watched.release()
         assert (controller.written(0.0), watched.patience_s(5.0)) == (b"", None)
-        watched.follow(b"hold " + bytes(tmp_path / "nothing").hex().encode() + b" 00", 6.0)
-        watched.follow(hold, 7.0)  # The newest hold counts.
-        watched.follow(b"hold " + os.devnull.encode().hex().encode() + b" 00", 7.0)
+        watched.execute(b"hold " + bytes(tmp_path / "nothing").hex().encode() + b" 00", 6.0)
+        watched.execute(hold, 7.0)  # The newest hold counts.
+        watched.execute(b"hold " + os.devnull.encode().hex().encode() + b" 00", 7.0)
         watched.release()
         assert controller.written(0.0) == b""
         assert (tmp_path / "answers").read_bytes() == b"held\nrefused\nheld\nheld\n"

@@ -15,7 +15,7 @@ def test_each_press_selects_the_next_speed_scale(first: float, expected: list[fl
     choices, found = Choices(first), []
     for _ in expected:
         for intent in (PRESSED, PRESSED, RELEASED):
-            choices.follow(intent)
+            choices.read(intent)
         found.append(choices.speed_scale)
     assert found == expected
 
@@ -23,10 +23,10 @@ def test_each_press_selects_the_next_speed_scale(first: float, expected: list[fl
 @pytest.mark.parametrize("busy", [{"l2": 0.1}, {"r2": 0.1}, {"lateral": (0.0, 0.1)}, {"turning": (0.1, 0.0)}])
 def test_a_press_takes_effect_at_rest(busy: dict[str, float]) -> None:
     choices = Choices()
-    choices.follow(OperatorIntent(next_speed=True, **busy))  # type: ignore[arg-type]
-    choices.follow(OperatorIntent(**busy))  # type: ignore[arg-type]
+    choices.read(OperatorIntent(next_speed=True, **busy))  # type: ignore[arg-type]
+    choices.read(OperatorIntent(**busy))  # type: ignore[arg-type]
     assert choices.speed_scale == 1.0
-    choices.follow(RELEASED)
+    choices.read(RELEASED)
     assert choices.speed_scale == 0.5
 
 
@@ -46,7 +46,7 @@ def test_each_press_selects_the_next_frame() -> None:
     choices, found = Choices(), []
     for _ in range(4):
         for intent in (OperatorIntent(next_frame=True), RELEASED):
-            choices.follow(intent)
+            choices.read(intent)
         found.append(choices.stick_frame)
     assert found == ["base", "camera", "tool", "base"]
 
@@ -71,9 +71,9 @@ def test_up_changes_sides_for_a_tool_that_faces_the_camera_only_at_rest() -> Non
     choices.see(telemetry(Header(1, 1, 0.0)), 1.0)
     for faces, turn_rad in ((False, 0.0), (True, 0.5 * math.pi)):
         choices.see(telemetry(Header(1, 1, 0.0), camera_faces=faces, camera_turn_rad=turn_rad), 1.0)
-        choices.follow(meant)
+        choices.read(meant)
         assert choices.commanded(meant, 1.0).lateral == (0.0, 1.0)
-    choices.follow(RELEASED)
+    choices.read(RELEASED)
     assert choices.commanded(meant, 1.0).lateral == pytest.approx((1.0, 0.0), abs=1e-12)
     unknown = Choices(stick_frame="camera")
     unknown.see(telemetry(Header(1, 1, 0.0), camera_faces=True), 1.0)

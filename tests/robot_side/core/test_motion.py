@@ -39,7 +39,7 @@ def test_the_arm_is_told_what_is_said(permitted: bool, gives_way: bool, monkeypa
     monkeypatch.setattr(type(grip.touchdown), "gives_way", property(lambda _: gives_way))
     motion, state = Motion(arm, PARTS.limits, PARTS.motion), arm.state(now_s)
     command = MotionCommand(Header(1, 1, 0.0), l2=0.0, r2=0.4, gripper=1.0, run=True) if permitted else None
-    motion.follow(Permission("armed", command, 1.1), PARTS.kinematics.pose(state), state, grip, None, now_s)
+    motion.command(Permission("armed", command, 1.1), PARTS.kinematics.pose(state), state, grip, None, now_s)
     [(velocity, until_s)], [told_gripper] = arm.told, arm.gripper
     if permitted and not gives_way:
         assert motion.commanded_rad_s is velocity

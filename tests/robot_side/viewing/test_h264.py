@@ -32,7 +32,7 @@ def step(encoder: H264, picture: Image, quality: int = 90, *, whole: bool = Fals
 
 def error(steps: Steps, sent: VideoStep, picture: Image) -> float | None:
     """Decode a step; return the root mean square error of the picture, of 255, or None if no picture results."""
-    frame = steps.follow(sent)
+    frame = steps.decode(sent)
     if frame is None:
         return None
     assert (frame.view, frame.captured_s) == ("first_person", 1.5)
@@ -60,13 +60,13 @@ def test_after_a_picture_that_is_lost_nothing_is_shown_until_a_whole_one() -> No
     sent = [step(encoder, moving(number), whole=number in (0, 20)) for number in range(30)]
     assert [one.number for one in sent if one.whole] == [1, 21]
     del sent[9]
-    shown = [steps.follow(one) is not None for one in sent]
+    shown = [steps.decode(one) is not None for one in sent]
     assert shown == 9 * [True] + 10 * [False] + 10 * [True]
     late = Steps()
-    assert late.follow(sent[4]) is None
+    assert late.decode(sent[4]) is None
     assert late.lacks == (0, 5)
     # Viewers that missed nothing are shown the whole one like any other.
-    assert late.follow(sent[19]) is not None
+    assert late.decode(sent[19]) is not None
     assert late.lacks == (0, 0)
 
 
@@ -88,13 +88,13 @@ def test_another_size_or_quality_begins_with_a_whole_picture() -> None:
 @pytest.mark.parametrize("content", [b"", b"\x00", bytes(1000), b"\x00\x00\x00\x01\x67" + bytes(range(200))])
 def test_bytes_that_are_no_picture_are_lacking_and_no_error(content: bytes) -> None:
     encoder, steps = H264(), Steps()
-    assert steps.follow(step(encoder, moving(0))) is not None
+    assert steps.decode(step(encoder, moving(0))) is not None
     for whole in (False, True):
-        assert steps.follow(VideoStep(HEADER, "first_person", 1.5, 160, 96, 2, whole, content)) is None
+        assert steps.decode(VideoStep(HEADER, "first_person", 1.5, 160, 96, 2, whole, content)) is None
         assert steps.lacks == (0, 2)
     wrong_size = VideoStep(HEADER, "first_person", 1.5, 320, 96, 3, True, step(encoder, moving(1), whole=True).h264)
-    assert steps.follow(wrong_size) is None
-    assert steps.follow(step(encoder, moving(2), whole=True)) is not None
+    assert steps.decode(wrong_size) is None
+    assert steps.decode(step(encoder, moving(2), whole=True)) is not None
     assert steps.lacks == (0, 0)
 
 
@@ -106,7 +106,7 @@ def test_the_companion_makes_jpeg_or_steps_as_each_order_says() -> None:
             picture = taker.picture("overview", h264=True)
             assert (picture.number, picture.whole) == (number, number == 1)
             place = HEADER, picture.view, picture.captured_s, WIDTH, HEIGHT
-            frame = steps.follow(VideoStep(*place, picture.number, picture.whole, picture.content))
+            frame = steps.decode(VideoStep(*place, picture.number, picture.whole, picture.content))
             assert frame is not None
             assert np.abs(simplejpeg.decode_jpeg(frame.jpeg) - jpeg).mean() < 3.0
         assert taker.picture("overview").number == 0

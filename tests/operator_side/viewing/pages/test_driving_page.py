@@ -238,5 +238,5 @@ def test_any_page_marks_episodes() -> None:
     pages, bench = DrivingPage(may_drive=False), Bench()
     for mark in ("start", "success", "success"):
         pages.receive(1, {"mark": mark}, bench.now_s)
-    pages.follow(bench.side, bench.now_s)
+    pages.apply(bench.side, bench.now_s)
     assert bench.side.summary()["episodes"] == {"start": 1, "success": 1}

@@ -56,7 +56,7 @@ class Watched:
                     self.pictures.receive(payload, bench.now_s)
             self._under_way = [one for one in self._under_way if one[0] > bench.now_s]
             shown = None if self.shown is None else self.shown(bench.now_s)
-            self.pictures.follow(bench.side, None if shown is None else bench.now_s - shown, bench.now_s)
+            self.pictures.update(bench.side, None if shown is None else bench.now_s - shown, bench.now_s)
             shares.append(self.pictures.hands)
         return shares
 
@@ -107,10 +107,10 @@ def test_another_clock_of_a_robot_side_started_anew_is_followed_and_what_is_brok
         payload = encode(VideoFrame(bench.robot.stamp(1.0), FIRST, captured_s, 8, 8, b"1"))
         for one in (payload, payload[:-1], b""):
             pictures.receive(one, captured_s)
-    pictures.follow(bench.side, None, 3.06)
+    pictures.update(bench.side, None, 3.06)
     assert pictures.facts().dead_s[0] == 0.5
     assert pictures.hands == 1.0
-    pictures.follow(bench.side, None, 3.5)
+    pictures.update(bench.side, None, 3.5)
     assert pictures.hands < 1.0
 
 

@@ -147,8 +147,8 @@ def test_nothing_is_perceived_before_the_first_frame() -> None:
 
 def test_what_is_drawn_follows_the_frames(scene: Any) -> None:
     sender, model = Sender(), PerceivedModel(scene)
-    assert model.follow(sender.says(CUP, {"name": "wedge", "tetrahedra": CORNERS, "quaternion": TURNED}))
-    assert not model.follow(sender.says(CUP | {"position_m": [0, 0, 0]}, {"name": "wedge", "tetrahedra": CORNERS}))
+    assert model.update(sender.says(CUP, {"name": "wedge", "tetrahedra": CORNERS, "quaternion": TURNED}))
+    assert not model.update(sender.says(CUP | {"position_m": [0, 0, 0]}, {"name": "wedge", "tetrahedra": CORNERS}))
     assert model.objects == ("cup", "wedge")
     (ball,), (wedge,) = model.object_shapes(0), model.object_shapes(1)
     assert (ball.kind, ball.size_m) == ("sphere", (0.05, 0.0, 0.0))
@@ -157,5 +157,5 @@ def test_what_is_drawn_follows_the_frames(scene: Any) -> None:
     first, second, third = corners[np.frombuffer(wedge.triangles, "<u4").reshape(-1, 3)].swapaxes(0, 1)
     outward = np.einsum("ti,ti->t", np.cross(second - first, third - first), first - corners.mean(axis=0))
     assert (outward > 0.0).all()
-    assert model.follow(sender.says({"name": "wedge", "tetrahedra": CORNERS}))
+    assert model.update(sender.says({"name": "wedge", "tetrahedra": CORNERS}))
     assert list(model.object_shapes(0)) == []
