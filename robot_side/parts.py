@@ -235,7 +235,7 @@ def _notes(scene: Scene, settings: RobotSettings, travel: GripperTravel | None) 
 def _as_loaded(scene: Scene, roles: Mapping[str, Role]) -> PerceivedObjects:
     """Return the objects as the scene starts, without the primitives of ignored objects."""
     nowhere = np.zeros((len(scene.objects), 3))
-    return scene.primitives.place(0.0, roles, nowhere, scene.data.geom_xpos, scene.data.geom_xmat)
+    return scene.primitives.perceived(0.0, roles, nowhere, scene.data.geom_xpos, scene.data.geom_xmat)
 
 
 def _cover_notes(cover: GripperCover, asked_m: float, held: HeldCovers) -> list[str]:

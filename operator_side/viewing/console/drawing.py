@@ -72,7 +72,7 @@ class _Batch:
         self._handle = _add(scene, name, solid, places, batched_scales=scales, batched_colors=self._colors)
         self._poses = np.full((len(members), 7), np.nan, np.float32)
 
-    def place(self, links: Floats, objects: Floats, tints: "_Tints") -> None:
+    def move(self, links: Floats, objects: Floats, tints: "_Tints") -> None:
         """Move and colour the shapes. links, objects: poses (n, 7) of the robot's links and of the objects."""
         outer = np.empty((len(self.owner), 7))
         outer[self.of_robot] = links[self.owner[self.of_robot]]
@@ -103,7 +103,7 @@ class _Ghost:
         self._count = 0
         self._radii: NDArray[np.float32] = np.zeros(0, np.float32)
 
-    def place(self, spheres: NDArray[np.float32], moved_m: Floats | None, inflated_m: float) -> None:
+    def draw(self, spheres: NDArray[np.float32], moved_m: Floats | None, inflated_m: float) -> None:
         """Draw spheres (m, 4), moved by `moved_m` (3,), radii grown by `inflated_m`; `moved_m` None hides them."""
         moved: NDArray[np.float32] = (spheres[:, :3] + (0.0 if moved_m is None else moved_m)).astype(np.float32)
         radii = np.full(len(spheres), _GONE, np.float32) if moved_m is None else spheres[:, 3] + np.float32(inflated_m)
@@ -177,7 +177,7 @@ class Drawing:
         tints = _tints(len(roles), state)
         with self._server.atomic():
             for batch in self._batches:
-                batch.place(links, self._objects, tints)
+                batch.move(links, self._objects, tints)
             self._place_label(shapes, roles)
             spheres = np.frombuffer(state.spheres, np.float32).reshape(-1, 4)
             along: Floats = SO3(np.array(state.tool_pose[3:])).apply(np.array([0.0, 0.0, 1.0])).astype(np.float64)
@@ -185,7 +185,7 @@ class Drawing:
                 self._ghosts, ("L2", "R2"), needed_m, (state.l2, state.r2), strict=True
             ):
                 sign = 1.0 if name == advancing else -1.0
-                ghost.place(spheres, None if ahead_m is None else sign * ahead_m * along, terms.sigma_m)
+                ghost.draw(spheres, None if ahead_m is None else sign * ahead_m * along, terms.sigma_m)
         if not self._looked:
             self._looked = True
             tool = np.array(state.tool_pose[:3])

@@ -114,7 +114,7 @@ class MujocoCamera:
         velocities_m_s: FloatArray = np.zeros((len(scene.objects), 3))
         velocities_m_s[things] = self._velocities.see(now_s, positions_m[things])
         whole = replace(
-            scene.primitives.place(now_s, scene.roles, offsets_m, data.geom_xpos, data.geom_xmat),
+            scene.primitives.perceived(now_s, scene.roles, offsets_m, data.geom_xpos, data.geom_xmat),
             positions_m=positions_m,
             rotations=data.geom_xmat[self._first_geoms].reshape(-1, 3, 3),
             velocities_m_s=velocities_m_s,

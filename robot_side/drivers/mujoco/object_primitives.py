@@ -116,7 +116,7 @@ class ObjectPrimitives:
         kept = kept[np.argsort(owners[kept], kind="stable")]
         return MovingPrimitives(self._primitives.only(kept), things, self._first_geoms[things])
 
-    def place(
+    def perceived(
         self,
         time_s: float,
         roles: Mapping[str, Role],

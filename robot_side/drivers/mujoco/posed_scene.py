@@ -88,7 +88,7 @@ class PosedScene:
     def perceived(self, errors_m: FloatArray) -> PerceivedObjects:
         """Return the objects in the present pose, as a camera with errors `errors_m` (k, 3) perceives them (eq. 1)."""
         scene, data = self.scene, self._data
-        return scene.primitives.place(0.0, scene.roles, errors_m, data.geom_xpos, data.geom_xmat)
+        return scene.primitives.perceived(0.0, scene.roles, errors_m, data.geom_xpos, data.geom_xmat)
 
 
 def disable_contacts(scene: Scene) -> None:

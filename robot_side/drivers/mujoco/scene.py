@@ -15,7 +15,7 @@ from common.errors import ConfigurationError
 from common.files.input_file import require_input_file
 from common.roles import Role
 from robot_side.arm.port import ArmState
-from robot_side.drivers.mujoco.brought.table import TABLE_PREFIX, attach, keep_from_slipping, settle, usual_place
+from robot_side.drivers.mujoco.brought.table import TABLE_PREFIX, attach, keep_from_slipping, settle, usual_table_pose
 from robot_side.drivers.mujoco.built_in_scenes import SceneName, furnish
 from robot_side.drivers.mujoco.hand.gripper_servos import serve_gripper
 from robot_side.drivers.mujoco.model_enums import GeomKind
@@ -129,7 +129,7 @@ def load_scene(
                 if moved_m:
                     start_pose += _MOVED.format(site, 1e3 * moved_m)
             else:
-                place = usual_place(model, robot, start)
+                place = usual_table_pose(model, robot, start)
             # Attaching extends the keyframes by the attached joints, so that a keyframe preserves the configuration.
             start_key = _START_KEY
             while any(model.key(key).name == start_key for key in range(model.nkey)):

@@ -63,8 +63,8 @@ TABLE_PREFIX: Final = "table_scene/"
 """Prefix that MuJoCo requires for attached elements; objects are named without it"""
 
 
-class Place(NamedTuple):
-    """Place of the table, relative to the robot at its start."""
+class TablePose(NamedTuple):
+    """Pose of the table, relative to the robot at its start."""
 
     yaw_rad: float
     """Direction from the base to the tool, about the vertical"""
@@ -79,21 +79,21 @@ class Settled(NamedTuple):
 
     start: FloatArray
     """(nq,) configuration"""
-    place: Place
+    table: TablePose
     moved_m: float
     """Distance by which the tool's site was moved, so that it is between the fingertips"""
     found: bool
     """Whether the start was searched for, because from the given one the target is out of reach"""
 
 
-def usual_place(model: Any, robot: RobotModel, start: FloatArray) -> Place:
-    """Return the place of the built-in arm's table: its top at the base's height, the tool at home above it."""
+def usual_table_pose(model: Any, robot: RobotModel, start: FloatArray) -> TablePose:
+    """Return the pose of the built-in arm's table: its top at the base's height, the tool at home above it."""
     data = _placed(model, start)
     base_m, tool_m = data.xpos[robot.root_body], data.site_xpos[robot.site]
     ahead = tool_m[:2] - base_m[:2]
     # A tool right above the base has no direction.
     yaw_rad = math.atan2(ahead[1], ahead[0]) if np.hypot(*ahead) > 0.05 else 0.0
-    return Place(yaw_rad, 0.0, float(base_m[2]))
+    return TablePose(yaw_rad, 0.0, float(base_m[2]))
 
 
 def settle(table: Any, model: Any, robot: RobotModel, start: FloatArray, *, may_search: bool) -> Settled:
@@ -112,16 +112,16 @@ def settle(table: Any, model: Any, robot: RobotModel, start: FloatArray, *, may_
     most = _MOST_STARTS if may_search and robot.arm_joints.size >= _FEWEST_JOINTS else 0
     for number, tried in enumerate(chain([start], islice(_other_starts(model, robot, start), most))):
         fit_target(table, thick_m, 0.0 if travel is None else _lean(model, robot, tried, travel), low=low)
-        if (place := _find_place(table, model, robot, tried, travel)) is not None:
-            settled = Settled(tried, place, moved_m, number > 0)
+        if (found := _find_table_pose(table, model, robot, tried, travel)) is not None:
+            settled = Settled(tried, found, moved_m, number > 0)
             break
     else:
         fit_target(table, thick_m, low=low)
-        settled = Settled(start, usual_place(model, robot, start), moved_m, found=False)
+        settled = Settled(start, usual_table_pose(model, robot, start), moved_m, found=False)
     if travel is not None:
         closing = closing_direction(_placed(model, settled.start), robot, travel)
-        _turn_target(table, closing, settled.place.yaw_rad)
-    make_room(table, *hand_reach_m(model, robot, settled.start, settled.place.yaw_rad)[:2])
+        _turn_target(table, closing, settled.table.yaw_rad)
+    make_room(table, *hand_reach_m(model, robot, settled.start, settled.table.yaw_rad)[:2])
     return settled
 
 
@@ -140,16 +140,16 @@ def fit_target(table: Any, thick_m: float, lean: float = 0.0, *, low: bool = Fal
         table.add_pair(geomname1="target", geomname2="table_top", friction=_SLIDES)
 
 
-def _find_place(
+def _find_table_pose(
     table: Any, model: Any, robot: RobotModel, start: FloatArray, travel: GripperTravel | None
-) -> Place | None:
-    """Return the first place of the table at which the tool reaches the target from `start`; None if there is none.
+) -> TablePose | None:
+    """Return the first pose of the table at which the tool reaches the target from `start`; None if there is none.
 
     None if the fingers close upwards, too: the target is upright.
     """
     if travel is not None and _lean(model, robot, start, travel) > _LEAN:
         return None
-    data, usual = _placed(model, start), usual_place(model, robot, start)
+    data, usual = _placed(model, start), usual_table_pose(model, robot, start)
     tool_m, approach = data.site_xpos[robot.site], data.site_xmat[robot.site].reshape(3, 3)[:, 2]
     lowest_m = tool_m[2] - hand_reach_m(model, robot, start, usual.yaw_rad)[2]
     from_target_m = np.array(table.body("target").pos) - np.array([*table.site("tool_home").pos[:2], 0.0])
@@ -248,20 +248,20 @@ def hand_reach_m(model: Any, robot: RobotModel, start: FloatArray, yaw_rad: floa
     return reach_m
 
 
-def attach(table: Any, spec: Any, model: Any, robot: RobotModel, start: FloatArray, place: Place) -> None:
-    """Attach the table's scene `table` to the robot's `spec`, at its place."""
+def attach(table: Any, spec: Any, model: Any, robot: RobotModel, start: FloatArray, pose: TablePose) -> None:
+    """Attach the table's scene `table` to the robot's `spec`, at its pose."""
     tool_m = _placed(model, start).site_xpos[robot.site]
     home_x, home_y, _ = table.site("tool_home").pos
     if model.geom_type[model.geom_type == GeomKind.PLANE].size:
         table.delete(table.geom("floor"))
-    cos, sin = math.cos(place.yaw_rad), math.sin(place.yaw_rad)
-    x, y = home_x + place.nearer_m, home_y
+    cos, sin = math.cos(pose.yaw_rad), math.sin(pose.yaw_rad)
+    x, y = home_x + pose.nearer_m, home_y
     spec.attach(
         table,
         prefix=TABLE_PREFIX,
         frame=spec.worldbody.add_frame(
-            pos=[tool_m[0] - (cos * x - sin * y), tool_m[1] - (sin * x + cos * y), place.top_m],
-            quat=[math.cos(place.yaw_rad / 2.0), 0.0, 0.0, math.sin(place.yaw_rad / 2.0)],
+            pos=[tool_m[0] - (cos * x - sin * y), tool_m[1] - (sin * x + cos * y), pose.top_m],
+            quat=[math.cos(pose.yaw_rad / 2.0), 0.0, 0.0, math.sin(pose.yaw_rad / 2.0)],
         ),
     )
 

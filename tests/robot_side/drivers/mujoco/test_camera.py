@@ -111,7 +111,7 @@ def test_a_frame_says_what_moves_and_is_what_a_camera_that_says_all_sees(built_i
     assert movers.first is first
     assert {names[thing] for thing in movers.things} == set(names) - built_in.fixed
     data = built_in.data
-    expected = built_in.primitives.place(0.2, built_in.roles, error.next_frame(), data.geom_xpos, data.geom_xmat)
+    expected = built_in.primitives.perceived(0.2, built_in.roles, error.next_frame(), data.geom_xpos, data.geom_xmat)
     for kind in KINDS:
         for name in kind.fields:
             np.testing.assert_array_equal(getattr(second, name), getattr(expected, name), err_msg=name)
