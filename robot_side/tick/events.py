@@ -16,7 +16,7 @@ from robot_side.tick.sensed import Sensed
 from robot_side.tick.situation import Situation
 
 Step = Literal["arm", "pose", "grip", "motion", "law", "messages", "listeners", "frame", "end"]
-"""Steps of a turn, in their order. A simulated arm advances its physics in `arm`. In `frame`, after the messages to
+"""Steps of a tick, in their order. A simulated arm advances its physics in `arm`. In `frame`, after the messages to
 operators have left, telemetry is made and the camera read. `end`: no step runs until the next one begins."""
 
 
