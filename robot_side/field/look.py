@@ -120,7 +120,7 @@ def _look_at(
     rows: int,
     thing: int,
     object_class: int,
-    early: float,
+    lead: float,
     along: Vector,
     half_gap: float,
     reach: float,
@@ -129,40 +129,40 @@ def _look_at(
 
     Clusters and pairs share one queue: pair p is the item p, cluster c the item -1 - c. While only a lower bound of a
     cluster's contact is known, the cluster is the item -1 - c - (number of clusters). Pairs that wait until all others
-    are done lie at the other end of the queue's array. early: lead that all pairs of the object have in common.
+    are done lie at the other end of the queue's array. lead: that which all pairs of the object have in common.
     """
     scratch = scratch_at(bundles.scratch)
     keys, items, count, pairs, waiting, margin = scratch.keys_m, scratch.items, 0, 0, 0, MARGIN_M
-    far, nearest = reach + margin + early, math.inf
+    far, nearest = reach + margin + lead, math.inf
     clusters = (spheres + CLUSTER - 1) // CLUSTER
     for cluster in range(clusters):
         bound, rough = _cluster_bound(bundles, rows, cluster, along, far)
         if bound <= far:
             item = -1 - cluster - (clusters if rough else 0)
-            count = push(keys, items, count, _key(bound, early, rough), item)
+            count = push(keys, items, count, _key(bound, lead, rough), item)
     while count > 0 and keys[0] < _last_to_count(scratch, margin):
         item, first = items[0], keys[0]
         count = drop_first(keys, items, count)
-        last = min(far, _last_to_count(scratch, margin) + early)
+        last = min(far, _last_to_count(scratch, margin) + lead)
         if item >= 0:
             if _follow(bundles, item, rows, thing, along, reach, True):
                 waiting += 1
                 items[items.size - waiting] = item
         elif item < -clusters:
             # Search at first only to a margin beyond the nearest cluster: most clusters are farther.
-            near = min(last, max(nearest, first + early) + margin)
+            near = min(last, max(nearest, first + lead) + margin)
             bound = _cluster_contact(bundles, rows, -1 - item - clusters, along, near, True)
             if bound <= near:
                 # An overlap may rise: now meshes are tested for overlap, too.
                 bound = _cluster_contact(bundles, rows, -1 - item - clusters, along, near, False)
                 nearest = min(nearest, bound)
-                count = push(keys, items, count, _key(bound, early, False), item + clusters)
+                count = push(keys, items, count, _key(bound, lead, False), item + clusters)
             elif near < last:
-                count = push(keys, items, count, near - early, item)
+                count = push(keys, items, count, near - lead, item)
         else:
             clear = first > -math.inf
             for i in range((-1 - item) * CLUSTER, min(-item * CLUSTER, spheres)):
-                met = pairs_of(bundles, pairs, i, rows, thing, object_class, early, along, half_gap, last, clear)
+                met = pairs_of(bundles, pairs, i, rows, thing, object_class, lead, along, half_gap, last, clear)
                 for place in range(pairs, pairs + met):
                     pair = scratch.pairs[place]
                     count = push(keys, items, count, pair.contact - pair.lead, place)
@@ -173,12 +173,12 @@ def _look_at(
 
 
 @inlined
-def _key(bound: float, early: float, rough: bool) -> float:
+def _key(bound: float, lead: float, rough: bool) -> float:
     """Return a cluster's key in the queue: its contact distance less the lead, or -∞ if it may overlap already.
 
     rough: whether `bound` is only a lower bound.
     """
-    return bound - early if bound > 0.0 or rough else -math.inf
+    return bound - lead if bound > 0.0 or rough else -math.inf
 
 
 @compiled(
@@ -198,17 +198,17 @@ def look(
     half_gap: float,
     reach: float,
     classes: IntArray,
-    early: FloatArray,
+    approach: FloatArray,
     scene_bundle: IntArray,
     scratch_bundle: IntArray,
 ) -> bool:
     """Fill the scratch's onset distances. Return False for numbers that are not finite: they would compare as far away.
 
     centers (m, 3), radii (m,), on_finger (m,): the gripper's spheres. tool (3,), jacobian (6, n): the tool's.
-    encoder_variance (n,): σ_θ².
-    direction (3,): the unit vector û. half_gap: half the gap between the fingers, the largest inflation of a finger's
-    sphere towards the target (§3.4). reach: distance examined. classes (k,): the objects' (`object_class`). early (k,):
-    distance by which each object approaches, subtracted from its contact distances; empty if all are at rest.
+    encoder_variance (n,): σ_θ². direction (3,): the unit vector û. half_gap: half the gap between the fingers, the
+    largest inflation of a finger's sphere towards the target (§3.4). reach: distance examined. classes (k,): the
+    objects' (`object_class`). approach (k,): distance by which each object approaches, subtracted from its contact
+    distances; empty if all are at rest.
     """
     bundles, scene, scratch = Bundles(scene_bundle, scratch_bundle), scene_at(scene_bundle), scratch_at(scratch_bundle)
     along, margin, spheres = load(direction.reshape(1, 3), 0), MARGIN_M, radii.size
@@ -220,29 +220,29 @@ def look(
     middle, size = around_spheres(scratch.spheres, scratch.inflation_m, 0, spheres)
     shorter = scratch.along_m[Error.ALONG]
     count, place, farthest, keys, things = 0, -1, reach + margin + shorter, scratch.bounds_m, scratch.objects
-    moves = early.size > 0
-    for thing in range(early.size):
-        if not math.isfinite(early[thing]):
+    moves = approach.size > 0
+    for thing in range(approach.size):
+        if not math.isfinite(approach[thing]):
             return False
-        farthest = max(farthest, reach + margin + shorter + early[thing])
+        farthest = max(farthest, reach + margin + shorter + approach[thing])
     while True:
         place = next_object(scene, place + 1, middle, along, farthest, size)
         if place >= scene.object_order.size:
             break
         thing = scene.object_order[place]
         if classes[thing] != SKIPPED:
-            first, end, sooner = scene.first_rows[thing], scene.first_rows[thing + 1], shorter
-            sooner += early[thing] if moves else 0.0
-            rows, nearest = _near_rows(bundles, first, end, middle, size, along, reach + margin + sooner)
+            first, end, lead = scene.first_rows[thing], scene.first_rows[thing + 1], shorter
+            lead += approach[thing] if moves else 0.0
+            rows, nearest = _near_rows(bundles, first, end, middle, size, along, reach + margin + lead)
             if rows > 0:
-                count = push(keys, things, count, nearest - sooner if nearest > 0.0 else -math.inf, thing)
+                count = push(keys, things, count, nearest - lead if nearest > 0.0 else -math.inf, thing)
     while count > 0 and keys[0] < _last_to_count(scratch, margin):
         thing = things[0]
         count = drop_first(keys, things, count)
-        first, end, sooner = scene.first_rows[thing], scene.first_rows[thing + 1], shorter
-        sooner += early[thing] if moves else 0.0
-        rows, _ = _near_rows(bundles, first, end, middle, size, along, reach + margin + sooner)
-        _look_at(bundles, spheres, rows, thing, classes[thing], sooner, along, half_gap, reach)
+        first, end, lead = scene.first_rows[thing], scene.first_rows[thing + 1], shorter
+        lead += approach[thing] if moves else 0.0
+        rows, _ = _near_rows(bundles, first, end, middle, size, along, reach + margin + lead)
+        _look_at(bundles, spheres, rows, thing, classes[thing], lead, along, half_gap, reach)
     for kind in range(2):
         soonest = math.inf
         for level in range(STRENGTHS - 1, -1, -1):

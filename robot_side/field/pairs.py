@@ -46,7 +46,7 @@ def _pair(
     rows: int,
     thing: int,
     object_class: int,
-    early: float,
+    lead: float,
     along: Vector,
     half_gap: float,
     reach: float,
@@ -55,19 +55,19 @@ def _pair(
     """Write and return the pair of gripper sphere `i` and object `thing`, in row `place` of the scratch's pairs.
 
     The contact is infinite if they do not touch within the reach. uninflated: the sphere keeps its own radius, and the
-    inflation becomes part of the lead instead. early: lead that all pairs of the object have in common.
+    inflation becomes part of the lead instead. lead: that which all pairs of the object have in common.
     """
     scratch = scratch_at(bundles.scratch)
     pair, inflated = scratch.pairs[place], scratch.inflation_m[i, 0]
     if object_class == TARGET and scratch.on_finger[i] and inflated > half_gap:
         inflated = half_gap
         scratch.counts[Count.LIMITED] += 1 if not uninflated else 0
-    sooner = inflated if uninflated else 0.0
-    pair.sphere, pair.object, pair.radius = i, thing, scratch.spheres[i, 3] + inflated - sooner
-    pair.lead, pair.touchable = early + sooner, object_class in (TOUCHABLE, TARGET)
+    own_lead = inflated if uninflated else 0.0
+    pair.sphere, pair.object, pair.radius = i, thing, scratch.spheres[i, 3] + inflated - own_lead
+    pair.lead, pair.touchable = lead + own_lead, object_class in (TOUCHABLE, TARGET)
     whole = inflated + scratch.along_m[Error.ALONG]
     pair.expected = max(whole - scratch.along_m[Error.EXPECTED], 0.0) if pair.touchable else 0.0
-    pair.contact, pair.closing = _meet_sphere(bundles, i, rows, pair.radius, along, reach + sooner, clear)
+    pair.contact, pair.closing = _meet_sphere(bundles, i, rows, pair.radius, along, reach + own_lead, clear)
     pair.overlaps = pair.contact == 0.0
     return pair
 
@@ -107,7 +107,7 @@ def pairs_of(
     rows: int,
     thing: int,
     object_class: int,
-    early: float,
+    lead: float,
     along: Vector,
     half_gap: float,
     reach: float,
@@ -120,7 +120,7 @@ def pairs_of(
     found = 0
     for uninflated in (False, True):
         pair = _pair(
-            bundles, place + found, i, uninflated, rows, thing, object_class, early, along, half_gap, reach, clear
+            bundles, place + found, i, uninflated, rows, thing, object_class, lead, along, half_gap, reach, clear
         )
         found += 1 if pair.contact < math.inf else 0
         # An inflated sphere that overlaps may contain the whole object: the uninflated sphere may still touch it ahead.
