@@ -3,7 +3,7 @@
 import math
 from collections import deque
 from dataclasses import dataclass, field
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -19,8 +19,7 @@ _STILL_RAD_S: Final = 0.01
 """Speed and angular speed up to which the gripper counts as at rest; objects count so up to STILL_M_S"""
 
 
-@dataclass(frozen=True)
-class GripperMotion:
+class GripperMotion(NamedTuple):
     """Velocities of the gripper, in the world frame."""
 
     linear_m_s: FloatArray

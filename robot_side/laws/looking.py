@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import dataclass, field
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -28,8 +28,7 @@ _ROUNDING_S: Final = 1e-9
 _NOTHING: Final[FloatArray] = np.zeros(3)
 
 
-@dataclass(frozen=True)
-class Seen:
+class Seen(NamedTuple):
     """Situation that one tick looks at, and what follows from it."""
 
     situation: Situation

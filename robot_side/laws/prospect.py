@@ -33,8 +33,7 @@ class Asked(NamedTuple):
     widest_m: float
 
 
-@dataclass(frozen=True)
-class Prospect:
+class Prospect(NamedTuple):
     """Arguments of a look, the arm's ability along it, and how its onset distances count from the tool."""
 
     asked: Asked

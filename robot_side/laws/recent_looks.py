@@ -5,7 +5,7 @@ If the tool has only translated since, the subtraction is exact.
 
 import math
 from dataclasses import dataclass, field
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -21,12 +21,11 @@ WAYPOINT_PERIOD_S: Final = 0.03
 _SAME_DIRECTION: Final = 0.999
 """Cosine of the largest angle, 2.6°, at which two looks count as along the same direction"""
 _MOST_WAYPOINTS: Final = EVEN_WAYPOINTS + 2
-ROOM: Final = 80
+ROOM: Final = 64
 """Capacity; if it is used up, the oldest look is replaced"""
 
 
-@dataclass(frozen=True)
-class Newest:
+class Newest(NamedTuple):
     """Newest look along one side from the gripper's present pose."""
 
     direction: FloatArray

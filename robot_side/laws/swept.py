@@ -44,8 +44,8 @@ from robot_side.tick.explained import Trigger, TriggerExplained
 from robot_side.tick.sensed import L2, R2, STICK, Sensed
 from robot_side.tick.situation import Situation
 
-LOOK_PERIOD_S: Final = 0.004
-"""Least time between two ticks that look: a controller is read and written no more often"""
+LOOK_PERIOD_S: Final = 0.008
+"""Least time between two ticks that look, unless something has changed: a controller is written to every 10 ms"""
 REST_PERIOD_S: Final = 0.05
 """Period of looks while everything rests"""
 _SAME_AGE_S: Final = 0.002
@@ -98,6 +98,8 @@ class SweptLaw:
             self._last = seen
         else:
             self._without_looks += 1
+            if self._sensed is not None and not seen.motion.moves and _same_age(seen, last):
+                return self._sensed
         self._sensed = self._field(seen)
         return self._sensed
 
@@ -193,18 +195,31 @@ class SweptLaw:
 
 def _is_due(seen: Seen, last: Seen) -> bool:
     """Return whether a tick looks: something moves or has changed, or the last looks are old."""
-    now, then = seen.situation, last.situation
-    if seen.classes is not last.classes or seen.assumed is not last.assumed:
-        return True
-    if len(now.pose.sphere_radii_m) != len(then.pose.sphere_radii_m):
-        return True
-    if now.compensation != then.compensation or (now.lateral == (0.0, 0.0)) != (then.lateral == (0.0, 0.0)):
+    if _differs(seen, last):
         return True
     passed_s = seen.passed_s + _ROUNDING_S
     if passed_s < LOOK_PERIOD_S:
         return False
-    changed = now.objects is not then.objects or abs(now.loop_age_s - then.loop_age_s) > _SAME_AGE_S
-    return changed or seen.motion.moves or passed_s >= REST_PERIOD_S
+    moves = seen.motion.moves or _has_changed(seen, last)
+    return moves or passed_s >= REST_PERIOD_S or not _same_age(seen, last)
+
+
+def _same_age(seen: Seen, last: Seen) -> bool:
+    """Return whether the loop age is about that of the last tick that looked."""
+    return abs(seen.situation.loop_age_s - last.situation.loop_age_s) <= _SAME_AGE_S
+
+
+def _differs(seen: Seen, last: Seen) -> bool:
+    """Return whether what is looked at, and how, differs from the last tick that looked; motion does not count."""
+    now, then = seen.situation, last.situation
+    return (
+        seen.classes is not last.classes
+        or seen.assumed is not last.assumed
+        or seen.motion.moves != last.motion.moves
+        or len(now.pose.sphere_radii_m) != len(then.pose.sphere_radii_m)
+        or (now.compensation, now.loop_age_known) != (then.compensation, then.loop_age_known)
+        or (now.lateral == (0.0, 0.0)) != (then.lateral == (0.0, 0.0))
+    )
 
 
 def _has_changed(seen: Seen, last: Seen) -> bool:

@@ -1,5 +1,7 @@
 """Field along one trigger, and the rumble, from onset distances."""
 
+from bisect import bisect_right
+
 import numpy as np
 
 from common.arrays import FloatArray
@@ -23,7 +25,7 @@ def trigger_field(onsets_m: FloatArray, able: Ability, displacement_m: float, ho
         full_speed_m_s=able.full_speed_m_s,
         acceleration_m_s2=able.acceleration_m_s2,
         displacement_m=displacement_m,
-        stiffness=sum(one <= displacement_m for one in fast_m) / STRENGTHS,
+        stiffness=bisect_right(fast_m, displacement_m) / STRENGTHS,
     )
 
 
