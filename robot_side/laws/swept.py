@@ -2,8 +2,8 @@
 
     motion ─▶ path ─▶ prospect: errors, ability ─▶ looks ─▶ field
 
-A look evaluates the law along one direction from one pose. Each tick looks along R2, L2, and the stick while it is
-deflected; while everything rests, every 50 ms. Between looks the tool's motion is subtracted from the onset distances,
+A look evaluates the law along one direction from one pose. Looks along R2, L2, and the stick while it is deflected are
+made every 8 ms, and at once if something changes; while everything rests, every 50 ms. Between looks the tool's motion is subtracted from the onset distances,
 which is exact for a translation. The shortest onset distances of the last 0.1 s count: where the gripper just passes
 an object, encoder noise alone can switch between no strength and full strength.
 
