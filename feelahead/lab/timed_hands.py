@@ -9,6 +9,7 @@ import functools
 import json
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -18,7 +19,7 @@ from common.command.command_line import run_command
 from operator_side.core import OperatorSide
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.main import command
-from operator_side.people.pulling_hands import FingerInput, PullingHands
+from operator_side.people.pulling_hands import PullingHands, constant_force
 
 _FORCE_N: Final = 2.0
 _CYCLE_S: Final = 3.0
@@ -28,11 +29,15 @@ _AT_ONCE_S: Final = 0.002
 """Time from the arrival of a field to a write, within which the field is the write's cause, in seconds"""
 
 
-def pulled(aside: bool, since_s: float) -> FingerInput:
+_FREE: Final[Any] = constant_force(0.0)(0.0)
+"""Input of a finger that does not pull; its class has had other names"""
+
+
+def pulled(aside: bool, since_s: float) -> Any:
     """Return a pull of R2 and then one of L2; aside: with the left stick to the right and then to the left."""
     there = since_s % _CYCLE_S < _CYCLE_S / 2.0
     r2_n, l2_n = (_FORCE_N, 0.0) if there else (0.0, _FORCE_N)
-    return FingerInput(r2_n, l2_n, left_stick=((_ASIDE if there else -_ASIDE) if aside else 0.0, 0.0))
+    return replace(_FREE, r2_n=r2_n, l2_n=l2_n, left_stick=((_ASIDE if there else -_ASIDE) if aside else 0.0, 0.0))
 
 
 class Resting(PullingHands):

@@ -47,6 +47,8 @@ _RUNS: Final[dict[State, tuple[str | None, str]]] = {
 """Frozen scene of each state, None for the built-in one, and how the person drives in it (`timed_hands`)"""
 _START_S: Final = 600.0
 _ARMED_S: Final = 60.0
+_END_S: Final = 120.0
+"""Time in seconds after which a side that does not end is killed: the machine may be busy"""
 _SETTLING_S: Final = 4.0
 """Time from the link, or from arming, to the measurement, in seconds: a machine that is too slow needs as long"""
 _THROTTLE_S: Final = 0.05
@@ -179,7 +181,7 @@ def run(cell: Case, seed: int) -> Iterator[Row]:
         for side in sides:
             side.interrupt()
         for side in sides:
-            side.stop()
+            side.stop(_END_S)
             side.check()
         robot, operator = (read_summary(pair.folder / f"{name}.json") for name in ("robot", "operator"))
         delays_s = json.loads((pair.folder / "delays.json").read_text(encoding="utf-8"))
