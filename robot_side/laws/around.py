@@ -30,8 +30,8 @@ _HOLDS_S: Final = 1.5
 are rare."""
 _SAME_TIME: Final = 0.05
 """Largest relative change of T, the time until the arm stands, after which the probes' looks still count"""
-_ANEW_S: Final = 0.05
-"""Time in which discarded looks are made again"""
+_MOST: Final = 4
+"""Maximum number of probes' looks in one tick, so that no tick takes much longer than others"""
 _ROUNDING: Final = 1e-6
 
 
@@ -91,18 +91,26 @@ class ProbeLooks:
         old = (self._at_s <= self._moved_s) & (self._at_s < self._now_s - _HOLDS_S)
         return bool(((self._at_s >= self._since_s) & ~old).all()) and 0.0 < self.full_s <= LONGEST_S
 
+    @property
+    def waits(self) -> bool:
+        """Whether discarded looks are to be made again."""
+        return self._since_s < math.inf and bool((self._at_s < self._since_s).any())
+
     def due(self, motion: GripperMotion, passed_s: float) -> list[tuple[int, int]]:
-        """Return side and number of the probes to look from: those that waited longest, as many as fit `passed_s`."""
+        """Return side and number of the probes to look from: those that waited longest, as many as fit `passed_s`.
+
+        All of them in the first tick, where `passed_s` is infinite.
+        """
         if self._since_s == math.inf:
             return []
         leads = np.array([[motion.ahead_m_s > -_RETREATS_M_S], [motion.ahead_m_s < _RETREATS_M_S]])
         waited = (self._now_s - self._at_s) / np.where(leads, PERIOD_S, _SELDOM * PERIOD_S)
         waited[self._at_s > self._moved_s] = -np.inf
         # A discarded look is due again at once: until then the operator side has the old map.
-        discarded = self._at_s < self._since_s
-        waited[discarded] = np.inf
-        share = min(passed_s / (_ANEW_S if discarded.any() else PERIOD_S), 1.0)
-        first = np.argsort(-waited, axis=None, kind="stable")[: math.ceil(2.0 * PROBES * share)]
+        waited[self._at_s < self._since_s] = np.inf
+        share = _MOST if self.waits else min(2.0 * PROBES * passed_s / PERIOD_S, _MOST)
+        most = math.ceil(share) if math.isfinite(passed_s) else 2 * PROBES
+        first = np.argsort(-waited, axis=None, kind="stable")[:most]
         return [divmod(one, PROBES) for one in first.tolist() if waited.flat[one] >= 1.0 - _ROUNDING]
 
     def add(self, side: int, number: int, direction: FloatArray, began_m: float, onsets_m: FloatArray) -> None:

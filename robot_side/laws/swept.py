@@ -3,9 +3,9 @@
     motion ─▶ path ─▶ prospect: errors, ability ─▶ looks ─▶ field
 
 A look evaluates the law along one direction from one pose. Looks along R2, L2, and the stick while it is deflected are
-made every 8 ms, and at once if something changes; while everything rests, every 50 ms. Between looks the tool's motion is subtracted from the onset distances,
-which is exact for a translation. The shortest onset distances of the last 0.1 s count: where the gripper just passes
-an object, encoder noise alone can switch between no strength and full strength.
+made every 8 ms, and at once if something changes; while everything rests, every 50 ms. Between looks the tool's motion
+is subtracted from the onset distances, which is exact for a translation. The shortest onset distances of the last 0.1 s
+count: where the gripper just passes an object, encoder noise alone can switch between no strength and full strength.
 
 While the gripper drifts, turns, or moves its fingers, looks along R2 and L2 are also made from waypoints on its path
 (`path`). The path ends where a command sent now has stopped the gripper. An operator side that traces its own sticks
@@ -90,7 +90,7 @@ class SweptLaw:
         """
         require_usable(situation, len(self.looking.ahead.encoder_sigma_rad), now_s)
         seen, last = self._see(situation, self._fingers.measure(situation.pose, now_s), now_s), self._last
-        if last is None or _is_due(seen, last):
+        if last is None or _is_due(seen, last, waits=self.looking.probes is not None and self.looking.probes.waits):
             other = last is None or last.classes is not seen.classes or last.assumed is not seen.assumed
             if other and self.looking.probes is not None:
                 self.looking.probes.discard()
@@ -193,15 +193,18 @@ class SweptLaw:
         return self._see(situation, None, 0.0).prospect(side, waypoint).asked
 
 
-def _is_due(seen: Seen, last: Seen) -> bool:
-    """Return whether a tick looks: something moves or has changed, or the last looks are old."""
+def _is_due(seen: Seen, last: Seen, *, waits: bool) -> bool:
+    """Return whether a tick looks: something moves or has changed, or the last looks are old.
+
+    waits: whether looks for the map are to be made again.
+    """
     if _differs(seen, last):
         return True
     passed_s = seen.passed_s + _ROUNDING_S
     if passed_s < LOOK_PERIOD_S:
         return False
     moves = seen.motion.moves or _has_changed(seen, last)
-    return moves or passed_s >= REST_PERIOD_S or not _same_age(seen, last)
+    return moves or waits or passed_s >= REST_PERIOD_S or not _same_age(seen, last)
 
 
 def _same_age(seen: Seen, last: Seen) -> bool:

@@ -136,12 +136,20 @@ def looks(law: SweptLaw, ticks: int, velocity: FloatArray, now_s: float, **chang
 
 def test_at_rest_nothing_is_looked_at_from_around_and_in_motion_every_probe_in_turn(law: SweptLaw) -> None:
     still, forth = np.zeros(6), np.array([0.0, 0.0, 0.2, 0.0, 0.0, 0.0])
-    looks(law, 500, still, 0.0)
-    resting = looks(law, 1000, still, 0.5)
-    moving = looks(law, 1000, forth, 1.5)
+    looks(law, 1000, still, 0.0)
+    resting = looks(law, 1000, still, 1.0)
+    moving = looks(law, 1000, forth, 2.0)
     # R2 and L2 are looked along every 50 ms at rest, and every 8 ms in motion.
     assert resting == pytest.approx(2 / 0.05, abs=2)
     assert moving - 2 / 0.008 == pytest.approx(PROBES * (1.0 + 0.25) / PERIOD_S, rel=0.1)
+
+
+def test_looks_that_are_made_again_are_spread_over_ticks_and_soon_complete(law: SweptLaw) -> None:
+    looks(law, 1000, np.zeros(6), 0.0)
+    law.expect(0.9)
+    made = [looks(law, 1, np.zeros(6), 1.0 + 0.004 * tick) for tick in range(25)]
+    assert max(made) <= 6
+    assert law.around(ball_pose()) is not None
 
 
 def test_what_has_just_appeared_straight_ahead_is_in_the_next_map(law: SweptLaw) -> None:
