@@ -2,22 +2,19 @@
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Final
 
 import numpy as np
 
 from common.arrays import BoolArray, FloatArray
 from robot_side.arm.port import GripperPose
 from robot_side.arm.resolved_rate import refuse, resolve
-from robot_side.compiled.kernel import BOOL, FLOAT64, compiled, input_array, output_array
+from robot_side.compiled.kernel import BOOL, FLOAT64, compiled, input_array, output_array, tuple_type
 from robot_side.compiled.stack import on_stack
 
 _MET = 1e-6
 """Largest deviation of the tool's motion from the commanded motion that counts as none, as a share of full speed"""
 _LEAST_SPEED_M_S = 1e-6
 _LEAST_RATE_RAD_S = 1e-9
-_FOUND: Final = 3
-"""Number of values that `_find_ability` fills before the joints' rates"""
 _twist = on_stack(6)
 
 
@@ -61,35 +58,36 @@ def ability(pose: GripperPose, limits: JointLimits, direction: FloatArray, full_
 
     full_speed_m_s: v_max of the settings.
     """
-    found = np.empty(_FOUND + limits.velocity_rad_s.size)
-    direction = np.ascontiguousarray(direction)
-    usable = _find_ability(
-        *(pose.tool_jacobian, direction, full_speed_m_s, limits.velocity_rad_s, limits.acceleration_rad_s2, found)
+    speed_m_s, acceleration_m_s2, off_m_s = _find_ability(
+        *(pose.tool_jacobian, np.ascontiguousarray(direction), full_speed_m_s),
+        *(limits.velocity_rad_s, limits.acceleration_rad_s2, np.empty(limits.velocity_rad_s.size)),
     )
-    if not usable:
+    if not speed_m_s > 0.0:
         refuse(pose.tool_jacobian, full_speed_m_s * direction, limits.velocity_rad_s)
-    speed_m_s, acceleration_m_s2, off_m_s = found[:_FOUND].tolist()
     return Ability(speed_m_s, acceleration_m_s2, within_reach=off_m_s <= _MET * full_speed_m_s)
 
 
-@compiled(input_array(2), input_array(1), FLOAT64, *(input_array(1),) * 2, output_array(1), returns=BOOL)
+@compiled(
+    *(input_array(2), input_array(1), FLOAT64, *(input_array(1),) * 2, output_array(1)),
+    returns=tuple_type(FLOAT64, FLOAT64, FLOAT64),
+)
 def _find_ability(
     jacobian: FloatArray,
     direction: FloatArray,
     full_speed: float,
     limits: FloatArray,
     accelerations: FloatArray,
-    found: FloatArray,
-) -> bool:
-    """Fill `found` (3 + n,): the tool's speed, acceleration and largest deviation of its motion, and joints' rates.
+    rates: FloatArray,
+) -> tuple[float, float, float]:
+    """Return the tool's speed, acceleration and largest deviation of its motion; the speed is 0 if `resolve` refuses.
 
-    jacobian (6, n), direction (3,), limits and accelerations (n,). Return False if `resolve` refuses them.
+    jacobian (6, n), direction (3,), limits and accelerations (n,). rates (n,): scratch, the joints'.
     """
-    twist, rates = _twist(), found[_FOUND:]
+    twist = _twist()
     for i in range(3):
         twist[i], twist[3 + i] = full_speed * direction[i], 0.0
     if not resolve(jacobian, twist, limits, rates):
-        return False
+        return 0.0, 0.0, 0.0
     speed, off, changing = 0.0, 0.0, _LEAST_RATE_RAD_S
     for row in range(6):
         given = 0.0
@@ -100,8 +98,7 @@ def _find_ability(
     for joint in range(rates.size):
         changing = max(changing, abs(rates[joint]) / accelerations[joint])
     speed = max(speed, _LEAST_SPEED_M_S)
-    found[0], found[1], found[2] = speed, speed / changing, off
-    return True
+    return speed, speed / changing, off
 
 
 def along_approach(pose: GripperPose, limits: JointLimits, full_speed_m_s: float) -> Ability:

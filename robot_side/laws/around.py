@@ -20,7 +20,7 @@ from robot_side.laws.gripper_motion import GripperMotion
 from robot_side.laws.path import Drift, Waypoint
 from robot_side.tick.sensed import L2, R2, Sensed
 
-_RETREATS_M_S: Final = 0.01
+RETREATS_M_S: Final = 0.01
 """Speed along the approach axis, forwards or backwards, below which both triggers count as the one that moves the
 gripper"""
 _SELDOM: Final = 4.0
@@ -103,7 +103,7 @@ class ProbeLooks:
         """
         if self._since_s == math.inf:
             return []
-        leads = np.array([[motion.ahead_m_s > -_RETREATS_M_S], [motion.ahead_m_s < _RETREATS_M_S]])
+        leads = np.array([[motion.ahead_m_s > -RETREATS_M_S], [motion.ahead_m_s < RETREATS_M_S]])
         waited = (self._now_s - self._at_s) / np.where(leads, PERIOD_S, _SELDOM * PERIOD_S)
         waited[self._at_s > self._moved_s] = -np.inf
         # A discarded look is due again at once: until then the operator side has the old map.

@@ -11,7 +11,7 @@ from common.protocol.around import PROBES
 from robot_side.field.field import Ahead, Field
 from robot_side.field.scratch import Count
 from robot_side.field.total_overlap import total_overlap_m3
-from robot_side.laws.around import ProbeLooks, probe
+from robot_side.laws.around import RETREATS_M_S, ProbeLooks, probe
 from robot_side.laws.classes import Classes
 from robot_side.laws.explanation import moved_and_inflated
 from robot_side.laws.gripper_motion import GripperMotion
@@ -24,6 +24,8 @@ from robot_side.tick.situation import Situation
 
 _OVERLAP_PERIOD_S: Final = 0.02
 """Period at which the overlap at δ is computed; this figure is for display only"""
+_SELDOM_S: Final = 0.03
+"""Period of looks along the trigger against which the gripper moves"""
 _ROUNDING_S: Final = 1e-9
 _NOTHING: Final[FloatArray] = np.zeros(3)
 
@@ -67,12 +69,16 @@ class Looking:
     _next_overlap_s: float = -math.inf
 
     def look(self, seen: Seen, *, changed: bool) -> None:
-        """Make the looks of one tick. changed: whether objects or the gripper's spheres have changed or moved."""
+        """Make the looks of one tick. changed: whether the situation has changed, or objects have moved."""
         situation, motion = seen.situation, seen.motion
         deflected, traced = situation.lateral != (0.0, 0.0), situation.compensation == "operator"
-        for side in (R2, L2, STICK)[: 3 if deflected else 2]:
-            self._look_from_here(side, seen)
-        if not deflected:
+        for side in (R2, L2):
+            leads = motion.ahead_m_s > -RETREATS_M_S if side == R2 else motion.ahead_m_s < RETREATS_M_S
+            if changed or leads or seen.now_s - self.newest[side].at_s + _ROUNDING_S >= _SELDOM_S:
+                self._look_from_here(side, seen)
+        if deflected:
+            self._look_from_here(STICK, seen)
+        else:
             self.sides[STICK].forget()
         until_s = stopping_s(self.newest[R2].able, situation.loop_age_s)
         # The operator side traces the sticks' motion through the map; then only the fingers' is looked along.
@@ -109,7 +115,7 @@ class Looking:
         found, motion = seen.prospect(side), seen.motion
         made, direction, began_m, onsets_m = self._one(found, seen)
         self.sides[side].add(0, seen.now_s, direction, began_m, onsets_m)
-        self.newest[side] = Newest(direction, began_m, found.asked.along.reach_m, found.able, made.sigma_m)
+        self.newest[side] = Newest(seen.now_s, direction, began_m, found.asked.along.reach_m, found.able, made.sigma_m)
         leads = side == (R2 if motion.ahead_m_s >= 0.0 else L2)
         if leads and seen.now_s >= self._next_overlap_s:
             self._next_overlap_s = seen.now_s + _OVERLAP_PERIOD_S - _ROUNDING_S

@@ -28,6 +28,7 @@ ROOM: Final = 64
 class Newest(NamedTuple):
     """Newest look along one side from the gripper's present pose."""
 
+    at_s: float
     direction: FloatArray
     """(3,) unit vector û"""
     began_m: float

@@ -3,9 +3,10 @@
     motion ─▶ path ─▶ prospect: errors, ability ─▶ looks ─▶ field
 
 A look evaluates the law along one direction from one pose. Looks along R2, L2, and the stick while it is deflected are
-made every 8 ms, and at once if something changes; while everything rests, every 50 ms. Between looks the tool's motion
-is subtracted from the onset distances, which is exact for a translation. The shortest onset distances of the last 0.1 s
-count: where the gripper just passes an object, encoder noise alone can switch between no strength and full strength.
+made every 8 ms, and at once if something changes; against the motion every 30 ms, at rest every 50 ms. Between looks
+the tool's motion is subtracted from the onset distances, which is exact for a translation. The shortest onset distances
+of the last 0.1 s count: where the gripper just passes an object, encoder noise alone can switch between no strength and
+full strength.
 
 While the gripper drifts, turns, or moves its fingers, looks along R2 and L2 are also made from waypoints on its path
 (`path`). The path ends where a command sent now has stopped the gripper. An operator side that traces its own sticks
@@ -94,7 +95,7 @@ class SweptLaw:
             other = last is None or last.classes is not seen.classes or last.assumed is not seen.assumed
             if other and self.looking.probes is not None:
                 self.looking.probes.discard()
-            self.looking.look(seen, changed=last is None or _has_changed(seen, last))
+            self.looking.look(seen, changed=last is None or _differs(seen, last) or _has_changed(seen, last))
             self._last = seen
         else:
             self._without_looks += 1

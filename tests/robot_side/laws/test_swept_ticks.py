@@ -14,7 +14,7 @@ from tests.helpers.gripper_poses import free_pose
 
 # Times of looks
 
-MOVING = moving(np.array([0.0, 0.0, 0.2]))
+SLOWLY, FORTH = moving(np.array([0.0, 0.0, 0.005])), moving(np.array([0.0, 0.0, 0.2]))
 
 
 class Watched:
@@ -45,13 +45,17 @@ def test_a_moving_gripper_is_looked_along_every_side_as_often_as_a_controller_is
     watched: Watched, step_s: float, every: int, lateral: tuple[float, float]
 ) -> None:
     sides = 2 + (lateral != (0.0, 0.0))
-    found = watched.ticks(step_s, 4 * every, joint_velocities_rad_s=MOVING, lateral=lateral)
+    found = watched.ticks(step_s, 4 * every, joint_velocities_rad_s=SLOWLY, lateral=lateral)
     assert found == [sides, *[0] * (every - 1)] * 4
+
+
+def test_the_trigger_against_which_the_gripper_moves_is_looked_along_less_often(watched: Watched) -> None:
+    assert watched.ticks(0.008, 9, joint_velocities_rad_s=FORTH) == [2, 1, 1, 1, 2, 1, 1, 1, 2]
 
 
 def test_at_rest_looks_are_rare_until_something_moves(watched: Watched) -> None:
     assert watched.ticks(0.005, 21) == [2, *[0] * 9] * 2 + [2]
-    assert watched.ticks(0.005, 3, joint_velocities_rad_s=MOVING) == [2, 0, 2]
+    assert watched.ticks(0.005, 3, joint_velocities_rad_s=SLOWLY) == [2, 0, 2]
 
 
 @pytest.mark.parametrize(
