@@ -17,9 +17,10 @@ import numpy as np
 
 from robot_side.compiled.machine_code import kept
 from robot_side.compiled.numba_inside import (
+    ForPython,
     WithoutMachineCode,
     entry_point,
-    ignore_constant_flags,
+    ignore_constants,
     keep_on_disk,
     machine,
 )
@@ -87,12 +88,12 @@ _FOR_CALLERS: dict[str, Any] = {**_OPTIONS, "pipeline_class": WithoutMachineCode
 
 def inlined(function: _Function) -> _Function:
     """Compile `function` into each kernel that calls it."""
-    return cast(_Function, numba.njit(forceinline=True, **_FOR_CALLERS)(function))
+    return cast(_Function, ignore_constants(numba.njit(forceinline=True, **_FOR_CALLERS)(function)))
 
 
 def building_block(function: _Function) -> _Function:
     """Compile `function` once for all kernels that call it; LLVM decides whether it is inlined."""
-    return cast(_Function, ignore_constant_flags(numba.njit(**_FOR_CALLERS)(function)))
+    return cast(_Function, ignore_constants(numba.njit(**_FOR_CALLERS)(function)))
 
 
 def _fused_multiply_add(_typing: Any, _a: Any, _b: Any, _c: Any) -> Any:
@@ -163,7 +164,7 @@ class Compiled:
 
     def __init__(self, function: Callable[..., Any], arguments: tuple[Any, ...], returns: Any = None) -> None:
         self.name = f"{function.__module__}.{function.__qualname__}"
-        self._dispatcher: Any = numba.njit(**_OPTIONS)(function)
+        self._dispatcher: Any = numba.njit(pipeline_class=ForPython, **_OPTIONS)(function)
         self.function = function
         """Python function from which the kernel is compiled"""
         self.signature = (returns or numba.types.void)(*arguments)

@@ -14,12 +14,19 @@ import numba
 from numba.core.caching import _Cache
 from numba.core.cgutils import alloca_once
 from numba.core.codegen import JITCodeLibrary
-from numba.core.compiler import CompilerBase, CompileResult, DefaultPassBuilder
-from numba.core.compiler_machinery import LoweringPass, register_pass
+from numba.core.compiler import CompilerBase, CompileResult
+from numba.core.compiler_machinery import LoweringPass, PassManager, register_pass
 from numba.core.registry import cpu_target
 from numba.core.serialize import dumps
-from numba.core.typed_passes import NativeLowering
-from numba.core.types import BooleanLiteral, boolean
+from numba.core.typed_passes import (
+    IRLegalization,
+    NativeLowering,
+    NoPythonBackend,
+    NopythonTypeInference,
+    PreLowerStripPhis,
+)
+from numba.core.types import BooleanLiteral, Function, IntegerLiteral
+from numba.core.untyped_passes import FixupArgs, GenericRewrites, IRProcessing, ReconstructSSA, TranslateByteCode
 from numba.np.arrayobj import get_itemsize, make_array, populate_array
 
 from robot_side.compiled.machine_code import keep, kept, machine_code_folder
@@ -43,14 +50,60 @@ class _ForCallers(LoweringPass):
 
 
 class _ForLinking(JITCodeLibrary):
-    """Library of optimised code that is only linked into kernels, and never loaded to run by itself.
+    """Library of one function's code as it was written, which is only linked into kernels.
 
-    With Numba's usual library a kernel's loops over lanes are half as fast.
+    Numba's usual library links and optimises a function again with each function that calls it.
     """
 
-    def _finalize_final_module(self) -> None:
+    def _optimize_functions(self, ll_module: Any) -> None:
+        ll_module.data_layout = self._codegen._data_layout
+
+    def finalize(self) -> None:
+        """Do nothing but note the addresses that the code contains: the kernel links and optimises it."""
         self._finalize_dynamic_globals()  # type: ignore[no-untyped-call]
         self._finalized = True
+
+
+class _Kernel(JITCodeLibrary):
+    """Library of a kernel, into which each function that it uses is linked once. All are optimised together."""
+
+    def finalize(self) -> None:
+        """Link, optimise, and generate machine code."""
+        found = dict.fromkeys(self._linking_libraries)
+        waiting = list(found)
+        while waiting:
+            library = waiting.pop()
+            if isinstance(library, _ForLinking):
+                new = [other for other in library._linking_libraries if other not in found]
+                found.update(dict.fromkeys(new))
+                waiting += new
+        self._linking_libraries = list(found)
+        super().finalize()  # type: ignore[no-untyped-call]
+
+
+def _pipeline(state: Any, library: Any, *last: Any) -> list[Any]:
+    """Return the compiler's passes: those of Numba's that our functions need, a third of all."""
+    state.library = library(state.targetctx.codegen(), state.func_id.func_qualname)
+    state.library.enable_object_caching()
+    passes: Any = PassManager("kernels")  # type: ignore[no-untyped-call]
+    for one in (*_PASSES, *last):
+        passes.add_pass(one, one.__name__)
+    passes.finalize()
+    return [passes]
+
+
+_PASSES: Final[tuple[Any, ...]] = (
+    *(TranslateByteCode, FixupArgs, IRProcessing, GenericRewrites, ReconstructSSA),
+    *(NopythonTypeInference, PreLowerStripPhis, IRLegalization, NativeLowering),
+)
+
+
+class ForPython(CompilerBase):
+    """Compiler of kernels."""
+
+    def define_pipelines(self) -> list[Any]:
+        """Return the pipeline, which ends with machine code."""
+        return _pipeline(self.state, _Kernel, NoPythonBackend)
 
 
 class WithoutMachineCode(CompilerBase):
@@ -60,28 +113,37 @@ class WithoutMachineCode(CompilerBase):
     """
 
     def define_pipelines(self) -> list[Any]:
-        """Return the pipeline: Numba's ordinary passes, with `_ForCallers` added."""
-        self.state.flags.no_cpython_wrapper = True
-        self.state.flags.no_cfunc_wrapper = True
-        self.state.flags.no_compile = True
-        library: Any = cast(Any, _ForLinking)(self.state.targetctx.codegen(), self.state.func_id.func_qualname)
-        library.enable_object_caching()
-        self.state.library = library
-        passes: Any = DefaultPassBuilder.define_nopython_pipeline(self.state)  # type: ignore[no-untyped-call]
-        passes.add_pass_after(_ForCallers, NativeLowering)
-        passes.finalize()
-        return [passes]
+        """Return the pipeline, which ends with `_ForCallers`."""
+        flags = self.state.flags
+        flags.no_cpython_wrapper = flags.no_cfunc_wrapper = flags.no_compile = True
+        return _pipeline(self.state, _ForLinking, _ForCallers, NoPythonBackend)
 
 
-def ignore_constant_flags(dispatcher: Any) -> Any:
-    """Let Numba compile one version of a function for all bools; return the function's dispatcher.
+def _resolved_once(resolve: Any) -> Any:
+    """Return Numba's search for an operator's code that looks up what was found for the same argument types before."""
 
-    By default Numba compiles one version for a literal True and one for a literal False.
+    def look_up(self: Any, context: Any, args: Any, kws: Any) -> Any:
+        key = args, tuple(kws.items())
+        found = vars(self).setdefault("found", {})
+        if key not in found:
+            found[key] = resolve(self, context, args, kws)
+        return found[key]
+
+    return look_up
+
+
+cast(Any, Function).get_call_type = _resolved_once(Function.get_call_type)
+
+
+def ignore_constants(dispatcher: Any) -> Any:
+    """Let Numba compile one version of a function for all integers and bools; return the function's dispatcher.
+
+    By default Numba compiles one version more for each constant that is an argument.
     """
     of_types = dispatcher.get_call_template
 
     def plain(given: Any) -> Any:
-        return boolean if isinstance(given, BooleanLiteral) else given
+        return given.literal_type if isinstance(given, BooleanLiteral | IntegerLiteral) else given
 
     def of_plain_types(args: Any, kws: Any) -> Any:
         return of_types(tuple(map(plain, args)), {name: plain(value) for name, value in kws.items()})
