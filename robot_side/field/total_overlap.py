@@ -26,20 +26,25 @@ def total_overlap_m3(
     entries stay. ValueError for a sphere that is not finite, because it would compare as far away.
     """
     require_finite("spheres", spheres)
-    return float(_sum_overlaps(spheres, classes, scene.bundle, np.empty(3), of_objects_m3))
+    whole = around(spheres, np.array([0, len(spheres)]))[0]
+    return float(_sum_overlaps(spheres, whole, classes, scene.bundle, np.empty(3), of_objects_m3))
 
 
-@compiled(input_array(2), input_indices(), BUNDLE, output_array(1), output_array(1), returns=FLOAT64)
+@compiled(*(input_array(2), input_array(1), input_indices(), BUNDLE, output_array(1), output_array(1)), returns=FLOAT64)
 def _sum_overlaps(
     spheres: FloatArray,
+    whole: FloatArray,
     classes: IntArray,
     scene_bundle: IntArray,
     overlap_gradient: FloatArray,
     of_objects: FloatArray,
 ) -> float:
-    """Return Σ V_ij in m³ as `total_overlap_m3` does. overlap_gradient (3,): scratch."""
+    """Return Σ V_ij in m³ as `total_overlap_m3` does.
+
+    whole (4,): a sphere around the spheres. overlap_gradient (3,): scratch.
+    """
     scene, count, total, nowhere = _scene_at(scene_bundle), spheres.shape[0], 0.0, (0.0, 0.0, 0.0)
-    middle, size = around(spheres, 0, count)
+    middle, size = (whole[0], whole[1], whole[2]), whole[3]
     place = next_object(scene, 0, middle, nowhere, 0.0, size)
     while place < scene.object_order.size:
         thing, mine = scene.object_order[place], 0.0

@@ -5,13 +5,13 @@ order stays when objects move; only the bounds of the blocks follow them.
 """
 
 import math
-from typing import Final
+from collections.abc import Callable
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from common.arrays import FloatArray, IntArray
-from robot_side.compiled.kernel import compiled, inlined, input_array, input_indices, output_array
-from robot_side.surroundings.bounds import write_around
+from robot_side.surroundings.bounds import around
 
 TOGETHER: Final = 64
 """Number of objects in a block, and of blocks in a group"""
@@ -47,26 +47,26 @@ def _spread(numbers: np.ndarray) -> np.ndarray:
     return numbers
 
 
-@inlined
-def bound_blocks(bounds: FloatArray, which: IntArray, blocks: FloatArray, groups: FloatArray) -> None:
-    """Write the bounds of the blocks `which` (rising indices), and of the groups that contain these blocks.
+class Together(NamedTuple):
+    """Blocks of objects, or groups of blocks, and where their members are."""
 
-    bounds (o, 4): of the objects, in the order of the blocks.
-    """
-    for k in range(which.size):
-        first = which[k] * TOGETHER
-        write_around(bounds, first, min(first + TOGETHER, bounds.shape[0]), blocks[which[k]])
-    done = -1
-    for k in range(which.size):
-        group = which[k] // TOGETHER
-        if group != done:
-            write_around(blocks, group * TOGETHER, min((group + 1) * TOGETHER, blocks.shape[0]), groups[group])
-            done = group
+    which: IntArray
+    """(w,) indices of the blocks"""
+    members: IntArray
+    """(m,) indices of all members, block after block"""
+    starts: IntArray
+    """(w + 1,) where each block's members begin, and m"""
+
+    def bound(self, members: FloatArray, blocks: FloatArray) -> None:
+        """Write the bounds of these blocks into `blocks` (b, 4). members (n, 4): bounds of all members there are."""
+        blocks[self.which] = around(members[self.members], self.starts)
 
 
-@compiled(input_array(2), input_indices(), output_array(2), output_array(2))
-def _bound(bounds: FloatArray, which: IntArray, blocks: FloatArray, groups: FloatArray) -> None:
-    bound_blocks(bounds, which, blocks, groups)
+def together(which: IntArray, count: int) -> Together:
+    """Return these blocks of `count` members in all."""
+    members = (which[:, None] * TOGETHER + np.arange(TOGETHER)).ravel()
+    ends = np.minimum((which + 1) * TOGETHER, count) - which * TOGETHER
+    return Together(which, members[members < count], np.concatenate([[0], ends.cumsum()]))
 
 
 class Blocks:
@@ -83,10 +83,21 @@ class Blocks:
         """(b, 4) centre and radius around each block"""
         self.groups: FloatArray = np.empty((-(-len(self.blocks) // TOGETHER), 4))
         """(c, 4) centre and radius around each group of blocks"""
-        _bound(self.bounds, np.arange(len(self.blocks)), self.blocks, self.groups)
+        self.bound(np.arange(len(self.order)))()
 
     def places(self, things: IntArray) -> IntArray:
         """Return the position in `order` of each of these objects; -1 for an object without bounds."""
         found = np.full(len(self._object_bounds), -1)
         found[self.order] = np.arange(len(self.order))
         return found[things]
+
+    def bound(self, places: IntArray) -> Callable[[], None]:
+        """Return a function that bounds the blocks and groups with the objects at these positions of `order` anew."""
+        which = np.unique(places // TOGETHER)
+        blocks, groups = together(which, len(self.bounds)), together(np.unique(which // TOGETHER), len(self.blocks))
+
+        def bound() -> None:
+            blocks.bound(self.bounds, self.blocks)
+            groups.bound(self.blocks, self.groups)
+
+        return bound

@@ -3,9 +3,12 @@
 import math
 from typing import Final
 
-from common.arrays import FloatArray
+import numpy as np
+
+from common.arrays import FloatArray, IntArray
 from robot_side.compiled.kernel import inlined
-from robot_side.compiled.vectors import Vector, add, dot, load, norm, scale, subtract
+from robot_side.compiled.vectors import Vector, dot, load, scale, subtract
+from robot_side.surroundings.kinds.layout import lengths
 
 _ENLARGED: Final = 1.0 + 1e-9
 """Bounds are enlarged by this factor, so that rounding never passes over a contact."""
@@ -23,28 +26,25 @@ def passes(center: Vector, along: Vector, reach: float, bounds: FloatArray, row:
     return dot(apart, apart) <= most * most
 
 
-@inlined
-def around(bounds: FloatArray, first: int, end: int) -> tuple[Vector, float]:
-    """Return centre and radius of a sphere around the bounding spheres in the rows `first` to `end` - 1.
+def around(bounds: FloatArray, starts: IntArray) -> FloatArray:
+    """Return for each group a sphere (g, 4) around its bounding spheres `bounds` (n, 4): centres and radii.
 
-    The radius is -inf without rows, and inf if one of the bounding spheres is infinite. bounds (n, 4): centres and
-    radii.
+    Group k has the rows from starts[k] up to starts[k + 1]; `starts` (g + 1,) ends with n. The radius is -inf without
+    rows, and inf if one of the bounding spheres is infinite.
     """
-    low, high, middle = (math.inf, math.inf, math.inf), (-math.inf, -math.inf, -math.inf), (0.0, 0.0, 0.0)
-    for row in range(first, end):
-        x, y, z, size = bounds[row, 0], bounds[row, 1], bounds[row, 2], bounds[row, 3]
-        low = min(low[0], x - size), min(low[1], y - size), min(low[2], z - size)
-        high = max(high[0], x + size), max(high[1], y + size), max(high[2], z + size)
-    if first < end and high[0] < math.inf:
-        middle = scale(0.5, add(low, high))
-    radius = -math.inf
-    for row in range(first, end):
-        radius = max(radius, norm(subtract(load(bounds, row), middle)) + bounds[row, 3])
-    return middle, radius
-
-
-@inlined
-def write_around(bounds: FloatArray, first: int, end: int, written: FloatArray) -> None:
-    """Write the centre and radius that `around` returns into `written` (4,)."""
-    middle, radius = around(bounds, first, end)
-    written[0], written[1], written[2], written[3] = middle[0], middle[1], middle[2], radius
+    sizes = starts[1:] - starts[:-1]
+    found = np.zeros((len(sizes), 4))
+    found[:, 3] = -math.inf
+    alone, several = (sizes == 1).nonzero()[0], (sizes > 1).nonzero()[0]
+    found[alone] = bounds[starts[alone]]
+    if len(several) == 0:
+        return found
+    sizes, own = sizes[several], bounds[(sizes != 1).repeat(sizes)]
+    first, centers, radii = sizes.cumsum() - sizes, own[:, :3], own[:, 3]
+    low = np.minimum.reduceat(centers - radii[:, None], first)
+    high = np.maximum.reduceat(centers + radii[:, None], first)
+    ends = high[:, :1] < math.inf
+    middles = 0.5 * (np.where(ends, low, 0.0) + np.where(ends, high, 0.0))
+    found[several, :3] = middles
+    found[several, 3] = np.maximum.reduceat(lengths(centers - middles.repeat(sizes, axis=0)) + radii, first)
+    return found

@@ -36,7 +36,16 @@ def object_distances(centers_m: FloatArray, radii_m: FloatArray, scene: SceneTab
     """Return each object's distance (k,) in m to the nearest of the spheres (m,); infinite beyond `reach_m`."""
     gaps: FloatArray = np.full(len(scene.objects.names), np.inf)
     spheres = np.concatenate([centers_m, radii_m[:, None]], axis=1)
-    _least_gaps(spheres, scene.bounds, scene.shapes, scene.kinds, scene.object_index, reach_m, gaps)
+    _least_gaps(
+        spheres,
+        around(spheres, np.array([0, len(spheres)]))[0],
+        scene.bounds,
+        scene.shapes,
+        scene.kinds,
+        scene.object_index,
+        reach_m,
+        gaps,
+    )
     for row in np.flatnonzero(scene.kinds == MESH):
         least = np.linalg.norm(centers_m - scene.bounds[row, :3], axis=1) - radii_m - scene.bounds[row, 3]
         near = np.flatnonzero(least <= reach_m)
@@ -47,9 +56,13 @@ def object_distances(centers_m: FloatArray, radii_m: FloatArray, scene: SceneTab
     return np.where(gaps <= reach_m, gaps, np.inf)
 
 
-@compiled(input_array(2), input_array(2), input_array(2), input_indices(), input_indices(), FLOAT64, output_array(1))
+@compiled(
+    *(input_array(2), input_array(1), input_array(2), input_array(2)),
+    *(input_indices(), input_indices(), FLOAT64, output_array(1)),
+)
 def _least_gaps(
     spheres: FloatArray,
+    whole: FloatArray,
     bounds: FloatArray,
     shapes: FloatArray,
     kinds: IntArray,
@@ -59,9 +72,9 @@ def _least_gaps(
 ) -> None:
     """Lower each object's gap (k,) to the least distance from the spheres to its primitives other than meshes.
 
-    Primitives whose bounds are farther away than `reach` are skipped.
+    whole (4,): a sphere around the spheres. Primitives whose bounds are farther away than `reach` are skipped.
     """
-    middle, size = around(spheres, 0, spheres.shape[0])
+    middle, size = (whole[0], whole[1], whole[2]), whole[3]
     for row in range(kinds.size):
         if kinds[row] == MESH or norm(subtract(load(bounds, row), middle)) - bounds[row, 3] - size > reach:
             continue

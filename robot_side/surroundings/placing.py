@@ -1,71 +1,36 @@
-"""Rows of a scene table from the numbers of its primitives, in one pass over all kinds."""
+"""Rows of a scene table from the numbers of its primitives."""
 
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from common.arrays import FloatArray, IntArray
-from robot_side.compiled.kernel import building_block, compiled, input_indices, output_array
-from robot_side.surroundings.bounds import write_around
-from robot_side.surroundings.kinds.kind import by_kind
+from robot_side.surroundings.bounds import around
+from robot_side.surroundings.kinds.kind import Placed
 from robot_side.surroundings.kinds.layout import SHAPE_NUMBERS
 from robot_side.surroundings.perceived import KINDS, PerceivedObjects
 
-_place_any: Final = by_kind([kind.place for kind in KINDS])
+
+def placed_rows(numbers: FloatArray, kinds: IntArray) -> Placed:
+    """Return shapes, bounds and volumes of primitives with these numbers (n, 20) and kinds (n,)."""
+    count = len(kinds)
+    rows = Placed(np.empty((count, SHAPE_NUMBERS)), np.empty((count, 4)), np.empty(count))
+    for number, kind in enumerate(KINDS):
+        mine = np.flatnonzero(kinds == number)
+        if len(mine):
+            for column, values in zip(rows, kind.place(numbers[mine]), strict=True):
+                column[mine] = values
+    return rows
 
 
-@building_block
-def place_one(kind: int, numbers: FloatArray, k: int, bounds: FloatArray, row: int) -> float:
-    """Call `Kind.place` of this kind."""
-    volume: float = _place_any(kind, numbers, k, bounds, row)
-    return volume
+def of_objects(rows: Placed, first_rows: IntArray) -> tuple[FloatArray, FloatArray]:
+    """Return bounds (k, 4) and volumes (k,) of objects; object k has the rows from first_rows[k] to first_rows[k + 1].
 
-
-@compiled(
-    *(output_array(2), input_indices(), input_indices()),
-    *(output_array(2), output_array(1), output_array(2), output_array(1)),
-)
-def _place(
-    numbers: FloatArray,
-    kinds: IntArray,
-    first_rows: IntArray,
-    bounds: FloatArray,
-    volumes: FloatArray,
-    object_bounds: FloatArray,
-    object_volumes: FloatArray,
-) -> None:
-    for row in range(kinds.size):
-        volumes[row] = place_one(kinds[row], numbers, row, bounds, row)
-    for thing in range(first_rows.size - 1):
-        first, end, volume = first_rows[thing], first_rows[thing + 1], 0.0
-        for row in range(first, end):
-            volume += volumes[row]
-        object_volumes[thing] = volume
-        write_around(bounds, first, end, object_bounds[thing])
-
-
-class Rows(NamedTuple):
-    """Result of `placed_rows`; the fields are as in SceneTable."""
-
-    shapes: FloatArray
-    bounds: FloatArray
-    volumes: FloatArray
-    """(n,) volume of each primitive, in m³"""
-    object_bounds: FloatArray
-    object_volumes: FloatArray
-
-
-def placed_rows(numbers: FloatArray, kinds: IntArray, first_rows: IntArray) -> Rows:
-    """Return the rows of a scene table, for primitives with these numbers (n, 20) and kinds (n,).
-
-    The primitives of object k are from first_rows[k] up to first_rows[k + 1].
+    first_rows (k + 1,) ends with the number of rows.
     """
-    rows, objects, numbers = len(kinds), len(first_rows) - 1, numbers.copy()
-    bounds, volumes = np.empty((rows, 4)), np.empty(rows)
-    object_bounds, object_volumes = np.empty((objects, 4)), np.empty(objects)
-    _place(numbers, kinds, first_rows, bounds, volumes, object_bounds, object_volumes)
-    shapes = np.ascontiguousarray(numbers[:, :SHAPE_NUMBERS])
-    return Rows(shapes, bounds, volumes, object_bounds, object_volumes)
+    owners = np.repeat(np.arange(len(first_rows) - 1), np.diff(first_rows))
+    volumes: FloatArray = np.bincount(owners, rows.volumes_m3, len(first_rows) - 1).astype(np.float64)
+    return around(rows.bounds, first_rows), volumes
 
 
 class Primitives(NamedTuple):

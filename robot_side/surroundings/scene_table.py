@@ -7,29 +7,35 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from common.arrays import FloatArray, IntArray
-from robot_side.surroundings.blocks import TOGETHER, Blocks
-from robot_side.surroundings.kinds.layout import MESH, NUMBERS
-from robot_side.surroundings.moving_rows import FLAT, WRITTEN, write_movers
+from robot_side.surroundings.blocks import Blocks
+from robot_side.surroundings.kinds.kind import Placed
+from robot_side.surroundings.kinds.layout import MESH, VELOCITY
 from robot_side.surroundings.perceived import KINDS, PerceivedObjects, SomeObjects
-from robot_side.surroundings.placing import numbers_of, placed_rows, primitives_of
+from robot_side.surroundings.placing import numbers_of, of_objects, placed_rows, primitives_of
 from robot_side.surroundings.scene_columns import SCENE
-from robot_side.surroundings.validity import require_valid
+from robot_side.surroundings.validity import are_possible, require_valid
 
 if TYPE_CHECKING:
     from robot_side.surroundings.placed_meshes import PlacedMeshes
 
 
 class MoverRows:
-    """Positions of the movers in a table's order of blocks, and the blocks that contain them."""
+    """Movers' primitives in a table, and the movers' places in the order of blocks."""
 
     def __init__(self, movers: SomeObjects, table: "SceneTable") -> None:
         self.movers = movers
-        self.places = table.blocks.places(movers.things)
-        self.blocks = np.unique(self.places[self.places >= 0] // TOGETHER)
+        self.rows = np.flatnonzero(np.isin(table.object_index, movers.things))
+        """(n,) rows of the movers' primitives"""
+        self.kinds = table.kinds[self.rows]
+        places = table.blocks.places(movers.things)
+        self.bounded = np.flatnonzero(places >= 0)
+        """Movers that have bounds"""
+        self.places = places[self.bounded]
+        """Their positions in the table's order of blocks"""
+        self.bound_blocks = table.blocks.bound(self.places)
         sizes = np.diff(table.first_rows)[movers.things]
         self.solid = bool((np.diff(movers.first_rows) == sizes).all())
         """Whether the table has all of the movers' primitives: none was left out for want of volume"""
-        self.room: tuple[FloatArray, FloatArray] = np.empty((1, NUMBERS)), np.empty((1, 4))
 
 
 @dataclass(eq=False)
@@ -116,8 +122,7 @@ def go_to(table: SceneTable, objects: PerceivedObjects) -> bool:
         table.objects, table.moving = before.movers.first, None
     if since is not None:
         moving = table.moving or MoverRows(since[0], table)
-        found = _write_movers(table, moving, since[1]) if moving.solid else FLAT
-        if found != WRITTEN:
+        if not (moving.solid and _write_movers(table, moving, since[1])):
             require_valid(objects)
             return False
         table.moving = moving
@@ -125,27 +130,40 @@ def go_to(table: SceneTable, objects: PerceivedObjects) -> bool:
     return True
 
 
-def _write_movers(table: SceneTable, moving: MoverRows, numbers: FloatArray) -> int:
-    """Write the movers' numbers into the table; return the result of `write_movers`."""
-    movers = moving.movers
-    where = movers.things, moving.places, moving.blocks
-    found = int(write_movers(numbers, *where, movers.measured, table.bundle, *moving.room))
-    if found == WRITTEN and table.placed is not None:
-        places, rows, *_ = movers.parts["mesh_positions_m"]
-        table.placed.positions[rows] = numbers[places, :3]
-        table.placed.rotations[rows] = numbers[places, 3:12].reshape(-1, 3, 3)
-    return found
+def _write_movers(table: SceneTable, moving: MoverRows, numbers: FloatArray) -> bool:
+    """Write the movers' numbers into the table. Return False, and write nothing, if some are invalid or without volume.
+
+    numbers (n + m, 20) as in `movers`.
+    """
+    movers, count = moving.movers, len(moving.rows)
+    own = numbers[:count]
+    velocities_m_s = numbers[count:, VELOCITY : VELOCITY + 3]
+    if not are_possible(own, moving.kinds) or (movers.measured and not np.isfinite(velocities_m_s).all()):
+        return False
+    placed = placed_rows(own, moving.kinds)
+    if not (placed.volumes_m3 > 0.0).all():
+        return False
+    bounds, volumes = of_objects(placed, movers.first_rows)
+    table.shapes[moving.rows], table.bounds[moving.rows] = placed.shapes, placed.bounds
+    table.object_bounds[movers.things], table.object_volumes[movers.things] = bounds, volumes
+    table.ordered_bounds[moving.places] = bounds[moving.bounded]
+    moving.bound_blocks()
+    if table.placed is not None:
+        places, meshes, *_ = movers.parts["mesh_positions_m"]
+        table.placed.positions[meshes] = numbers[places, :3]
+        table.placed.rotations[meshes] = numbers[places, 3:12].reshape(-1, 3, 3)
+    return True
 
 
 def make(objects: PerceivedObjects) -> SceneTable:
     """Return the table of a valid frame: primitives grouped by object, without primitives that have no volume."""
     owners, kinds, rows_of_kind = primitives_of(objects)
-    numbers = numbers_of(objects)
-    volumes = placed_rows(numbers, kinds, np.zeros(1, dtype=np.int64)).volumes
+    placed = placed_rows(numbers_of(objects), kinds)
     order = np.argsort(owners, kind="stable")
-    order = order[volumes[order] > 0.0]
+    order = order[placed.volumes_m3[order] > 0.0]
     first_rows = np.searchsorted(owners[order], np.arange(len(objects.names) + 1))
-    rows = placed_rows(numbers[order], kinds[order], first_rows)
+    rows = Placed(*(column[order] for column in placed))
+    object_bounds, object_volumes = of_objects(rows, first_rows)
     return SceneTable(
         objects=objects,
         bounds=rows.bounds,
@@ -153,7 +171,7 @@ def make(objects: PerceivedObjects) -> SceneTable:
         kinds=kinds[order],
         rows_of_kind=rows_of_kind[order],
         first_rows=first_rows,
-        object_bounds=rows.object_bounds,
-        object_volumes=rows.object_volumes,
+        object_bounds=object_bounds,
+        object_volumes=object_volumes,
         flat=len(owners) - len(order),
     )

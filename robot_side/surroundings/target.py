@@ -1,49 +1,20 @@
 """Choice of the target: centres of objects, and the next target when the operator presses the button for it."""
 
-import math
-
 import numpy as np
 
 from common.arrays import FloatArray, IntArray
 from common.roles import Role
-from robot_side.compiled.columns import BUNDLE
-from robot_side.compiled.kernel import INT64, compiled, output_array
 from robot_side.surroundings.kinds.layout import HALF_SPACE, TETRAHEDRON
 from robot_side.surroundings.perceived import PerceivedObjects
-from robot_side.surroundings.scene_columns import SCENE
 from robot_side.surroundings.scene_table import SceneTable
 
 _OFF_AXIS_WEIGHT = 3.0
 """Factor by which distances across the approach axis count more than along it, when objects are ordered by nearness"""
-_scene = SCENE.at
-
-
-@compiled(BUNDLE, INT64, output_array(2))
-def _center(bundle: IntArray, first: int, centers: FloatArray) -> None:
-    """Fill the centres (m, 3) of the m objects from number `first` on."""
-    scene = _scene(bundle)
-    centers[:] = 0.0
-    for k in range(centers.shape[0]):
-        count = 0
-        for row in range(scene.first_rows[first + k], scene.first_rows[first + k + 1]):
-            if scene.kinds[row] == HALF_SPACE:
-                continue
-            count += 1
-            points = 4 if scene.kinds[row] == TETRAHEDRON else 1
-            for axis in range(3):
-                total = 0.0
-                for point in range(points):
-                    total += scene.shapes[row, 3 * point + axis]
-                centers[k, axis] += total / points
-        for axis in range(3):
-            centers[k, axis] = centers[k, axis] / count if count > 0 else math.nan
 
 
 def object_centers(table: SceneTable) -> FloatArray:
     """Return each object's centre (k, 3), as `center_m` does; NaN for an object that is infinite or ignored."""
-    centers: FloatArray = np.empty((len(table.first_rows) - 1, 3))
-    _center(table.bundle, 0, centers)
-    return centers
+    return _centers(table.shapes, table.kinds, table.object_index, len(table.first_rows) - 1)
 
 
 def center_m(table: SceneTable, thing: int) -> FloatArray:
@@ -51,9 +22,21 @@ def center_m(table: SceneTable, thing: int) -> FloatArray:
 
     A mesh's centre is that of its bounding box in its own frame.
     """
-    center: FloatArray = np.empty(3)
-    _center(table.bundle, thing, center.reshape(1, 3))
+    mine = slice(*table.first_rows[thing : thing + 2])
+    center: FloatArray = _centers(table.shapes[mine], table.kinds[mine], np.zeros_like(table.kinds[mine]), 1)[0]
     return center
+
+
+def _centers(shapes: FloatArray, kinds: IntArray, owners: IntArray, count: int) -> FloatArray:
+    """Return the centres (count, 3) of objects; owners (n,): each primitive's object."""
+    points, four = shapes[:, :3].copy(), kinds == TETRAHEDRON
+    points[four] = shapes[four, :12].reshape(-1, 4, 3).mean(axis=1)
+    ends = kinds != HALF_SPACE
+    numbers = np.bincount(owners[ends], minlength=count)
+    sums = np.stack([np.bincount(owners[ends], points[ends, axis], count) for axis in range(3)], axis=1)
+    with np.errstate(invalid="ignore"):
+        centers: FloatArray = sums / numbers[:, None]
+    return centers
 
 
 def next_target(

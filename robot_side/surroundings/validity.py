@@ -1,20 +1,34 @@
 """Validation of the camera's frames, once for each frame."""
 
-import math
 from typing import Final
 
 import numpy as np
 
-from common.arrays import FloatArray, IntArray, require_finite
-from robot_side.compiled.kernel import BOOL, building_block, compiled, inlined, input_array, input_indices
-from robot_side.surroundings.kinds.kind import Check, Kind
-from robot_side.surroundings.kinds.layout import NUMBERS
+from common.arrays import BoolArray, FloatArray, IntArray, require_finite
+from robot_side.surroundings.kinds.kind import Check
 from robot_side.surroundings.perceived import KINDS, PerceivedObjects
-from robot_side.surroundings.placing import numbers_of, primitives_of
 
 _UNIT_TOLERANCE = 1e-6
 _FIELDS: Final = tuple((kind.owner, *array) for kind in KINDS for array in kind.arrays)
 """For each array: the name of its kind's `*_object` field, then name, shape of a row, and check"""
+_COLUMNS: Final = {Check.UNIT: 1, Check.ORTHONORMAL: 3}
+"""Number of columns of a matrix (3, c) whose columns are unit vectors at right angles"""
+_EYES: Final = {check: np.eye(count) for check, count in _COLUMNS.items()}
+
+
+def _of_numbers() -> dict[tuple[int, int, Check], BoolArray]:
+    """Return, for a part of a primitive's numbers and a check, whether this is to be checked in each kind."""
+    found: dict[tuple[int, int, Check], BoolArray] = {}
+    for number, kind in enumerate(KINDS):
+        for array in kind.arrays:
+            if array.check not in (Check.FINITE, Check.INDEX):
+                part = kind.parts[array.name][0]
+                key = part.start, part.stop, array.check
+                found.setdefault(key, np.zeros(len(KINDS), dtype=np.bool_))[number] = True
+    return found
+
+
+_OF_NUMBERS: Final = _of_numbers()
 _CHECKED: Final = tuple(array for kind in KINDS for array in kind.arrays if array.check is not Check.INDEX)
 
 
@@ -51,8 +65,10 @@ def require_valid(objects: PerceivedObjects) -> None:
                 f" of {len(objects.names)} objects"
             )
         require_finite("objects.velocities_m_s", velocities)
-    if not _are_possible(numbers_of(objects), primitives_of(objects).kinds):
-        _refuse(objects)
+    for name, _, check in _CHECKED:
+        fault = _fault(getattr(objects, name), check)
+        if fault is not None:
+            raise ValueError(f"objects.{name}{fault}")
 
 
 def _require_known_meshes(objects: PerceivedObjects) -> None:
@@ -75,75 +91,23 @@ def _described(values: np.ndarray) -> str:
     return f"{values.dtype} in the shape {values.shape} and steps of {values.strides}"
 
 
-def _refuse(objects: PerceivedObjects) -> None:
-    """Raise the ValueError that names the invalid array."""
-    for name, _, check in _CHECKED:
-        values = getattr(objects, name)
-        require_finite(f"objects.{name}", values)
-        if check is Check.NOT_NEGATIVE and (values < 0.0).any():
-            raise ValueError(f"objects.{name} = {values.min()} is negative; valid: 0 or more")
-        if check in (Check.UNIT, Check.ORTHONORMAL):
-            columns = values.reshape(len(values), 3, 3 if check is Check.ORTHONORMAL else 1)
-            error = np.abs(columns.swapaxes(1, 2) @ columns - np.eye(columns.shape[2]))
-            if (error > _UNIT_TOLERANCE).any():
-                raise ValueError(
-                    f"objects.{name} is off unit length or a right angle by {error.max():.1e}; valid: up to 1e-6"
-                )
+def _fault(values: FloatArray, check: Check) -> str | None:
+    """Return what is invalid about the values (k, ...) of an array, with what would be valid; None if nothing is."""
+    if not np.isfinite(values).all():
+        return " holds NaN or infinity; valid: finite numbers"
+    if check is Check.NOT_NEGATIVE and (values < 0.0).any():
+        return f" = {values.min()} is negative; valid: 0 or more"
+    if check in _COLUMNS:
+        error = np.abs(np.einsum("kij,kil->kjl", *(values.reshape(-1, 3, _COLUMNS[check]),) * 2) - _EYES[check])
+        if (error > _UNIT_TOLERANCE).any():
+            return f" is off unit length or a right angle by {error.max():.1e}; valid: up to 1e-6"
+    return None
 
 
-_ANY, _FINITE, _LEAST_0, _UNIT, _ORTHONORMAL = range(5)
-
-
-def _codes(kind: Kind) -> list[int]:
-    """Return the code of the check of each of a primitive's 20 numbers.
-
-    The check of a vector or a matrix is at the first of its numbers.
-    """
-    codes = [_ANY] * NUMBERS
-    for array in kind.arrays:
-        if array.name in kind.parts:
-            part = kind.parts[array.name][0]
-            codes[part] = [_LEAST_0 if array.check is Check.NOT_NEGATIVE else _FINITE] * (part.stop - part.start)
-            codes[part.start] = {Check.UNIT: _UNIT, Check.ORTHONORMAL: _ORTHONORMAL}.get(array.check, codes[part.start])
-    return codes
-
-
-_CODES: Final = np.array([_codes(kind) for kind in KINDS])
-
-
-@inlined
-def _are_unit(numbers: FloatArray, row: int, start: int, columns: int) -> bool:
-    """Return whether the matrix (3, columns) that begins at `start` has unit columns at right angles."""
-    for first in range(columns):
-        for second in range(first + 1):
-            product = -1.0 if first == second else 0.0
-            for entry in range(start, start + 3 * columns, columns):
-                product += numbers[row, entry + first] * numbers[row, entry + second]
-            # NaN fails the comparison.
-            if not abs(product) <= _UNIT_TOLERANCE:
-                return False
-    return True
-
-
-@building_block
-def is_possible(kind: int, numbers: FloatArray, row: int) -> bool:
-    """Return whether the numbers (n, 20) in `row` are valid for a primitive of this kind."""
-    for place in range(NUMBERS):
-        code = _CODES[kind, place]
-        if code != _ANY:
-            value = numbers[row, place]
-            if not math.isfinite(value) or (code == _LEAST_0 and value < 0.0):
-                return False
-            if code == _UNIT and not _are_unit(numbers, row, place, 1):
-                return False
-            if code == _ORTHONORMAL and not _are_unit(numbers, row, place, 3):
-                return False
-    return True
-
-
-@compiled(input_array(2), input_indices(), returns=BOOL)
-def _are_possible(numbers: FloatArray, kinds: IntArray) -> bool:
-    possible = True
-    for row in range(kinds.size):
-        possible = possible and is_possible(kinds[row], numbers, row)
-    return possible
+def are_possible(numbers: FloatArray, kinds: IntArray) -> bool:
+    """Return whether the numbers (n, 20) are valid for primitives of these kinds (n,)."""
+    for (first, last, check), of_kinds in _OF_NUMBERS.items():
+        values = numbers[of_kinds[kinds], first:last]
+        if len(values) and _fault(values, check) is not None:
+            return False
+    return bool(np.isfinite(numbers).all())

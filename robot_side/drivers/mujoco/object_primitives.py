@@ -9,12 +9,9 @@ import numpy as np
 
 from common.arrays import BoolArray, FloatArray, IntArray
 from common.roles import Role
-from robot_side.compiled.kernel import compiled, input_array, input_indices, output_array
-from robot_side.compiled.vectors import add, load
 from robot_side.drivers.mujoco.mesh_arrays import mesh_vertices
 from robot_side.drivers.mujoco.model_enums import GeomKind
-from robot_side.surroundings.kinds.kind import by_kind
-from robot_side.surroundings.kinds.layout import MESH, NUMBERS, rows, write_pose
+from robot_side.surroundings.kinds.layout import MESH, NUMBERS, rows
 from robot_side.surroundings.kinds.mesh import of_library
 from robot_side.surroundings.perceived import KINDS, PerceivedObjects
 
@@ -174,38 +171,17 @@ class MovingPrimitives(NamedTuple):
     def numbers(self, offsets_m: FloatArray, geom_positions_m: FloatArray, geom_rotations: FloatArray) -> FloatArray:
         """Return the movers' numbers (n + m, 20) as in `movers`, with velocities 0; arguments as for `place`."""
         primitives, things, first_geoms = self
-        numbers: FloatArray = np.empty((len(primitives.kinds) + len(things), NUMBERS))
-        _place(geom_positions_m, geom_rotations, offsets_m, *primitives, things, first_geoms, numbers)
+        rotations = geom_rotations.reshape(-1, 3, 3)
+        positions_m = geom_positions_m[primitives.geoms] + offsets_m[primitives.owners]
+        turned = rotations[primitives.geoms]
+        numbers: FloatArray = np.zeros((len(primitives.kinds) + len(things), NUMBERS))
+        for number, kind in enumerate(KINDS):
+            mine = np.flatnonzero(primitives.kinds == number)
+            if len(mine):
+                numbers[mine] = kind.placed(primitives.sizes[mine], positions_m[mine], turned[mine])
+        poses = geom_positions_m[first_geoms] + offsets_m[things], rotations[first_geoms]
+        numbers[len(primitives.kinds) :] = rows(*poses, width=NUMBERS)
         return numbers
-
-
-_placed = by_kind([kind.placed for kind in KINDS])
-
-
-@compiled(
-    *(input_array(2), input_array(2), input_array(2)),
-    *(input_indices(), input_indices(), input_indices(), input_array(2), input_indices(), input_indices()),
-    output_array(2),
-)
-def _place(
-    positions: FloatArray,
-    turns: FloatArray,
-    offsets: FloatArray,
-    kinds: IntArray,
-    geoms: IntArray,
-    owners: IntArray,
-    sizes: FloatArray,
-    things: IntArray,
-    first_geoms: IntArray,
-    numbers: FloatArray,
-) -> None:
-    numbers[:] = 0.0
-    for k in range(kinds.size):
-        position = add(load(positions, geoms[k]), load(offsets, owners[k]))
-        _placed(kinds[k], sizes, k, position, turns, geoms[k], numbers, k)
-    for k in range(things.size):
-        geom = first_geoms[k]
-        write_pose(add(load(positions, geom), load(offsets, things[k])), turns, geom, numbers, kinds.size + k)
 
 
 def _primitive_kind(model: Any, geom: int) -> str | None:

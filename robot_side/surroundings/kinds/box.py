@@ -7,40 +7,38 @@ from common.arrays import FloatArray, IntArray
 from robot_side.compiled.kernel import FLOAT64, building_block, compiled, inlined, power_of_two_below
 from robot_side.compiled.vectors import Vector, add, dot, norm, scale, subtract
 from robot_side.overlap.solids.box_lane import box_lane
-from robot_side.surroundings.kinds.kind import Array, Check, Kind
+from robot_side.surroundings.kinds.kind import Array, Check, Kind, Placed
 from robot_side.surroundings.kinds.layout import (
     CLOSING,
     LEAST_CONTACT_M,
     MOST_STEPS,
     NEVER,
+    NUMBERS,
     OVERLAP,
+    SHAPE_NUMBERS,
     TOUCHING_M,
     Contact,
     Nearest,
+    around,
+    lengths,
     posed,
+    rows,
     to_metres,
-    write_pose,
 )
 
 
-@inlined
-def place(numbers: FloatArray, k: int, bounds: FloatArray, row: int) -> float:
-    """Write the bounding sphere of one box; return the box's volume in m³."""
-    half = numbers[k, 12], numbers[k, 13], numbers[k, 14]
-    for axis in range(3):
-        bounds[row, axis] = numbers[k, axis]
-    bounds[row, 3] = norm(half)
-    return 8.0 * float(half[0] * half[1] * half[2])
+def place(numbers: FloatArray) -> Placed:
+    """Return the boxes (k) with these numbers (k, 20)."""
+    half = numbers[:, 12:15]
+    return Placed(
+        numbers[:, :SHAPE_NUMBERS], around(numbers[:, :3], lengths(half)), 8.0 * half[:, 0] * half[:, 1] * half[:, 2]
+    )
 
 
-@inlined
-def placed(
-    sizes: FloatArray, k: int, position: Vector, turns: FloatArray, turn: int, numbers: FloatArray, row: int
-) -> None:
-    """Write the numbers of a box in a frame at this pose. sizes: the box's centre in that frame, and its half sizes."""
-    write_pose(posed(position, turns, turn, sizes[k, 0], sizes[k, 1], sizes[k, 2]), turns, turn, numbers, row)
-    for axis in range(3):
-        numbers[row, 12 + axis] = sizes[k, 3 + axis]
+def placed(sizes: FloatArray, positions: FloatArray, rotations: FloatArray) -> FloatArray:
+    """Return the numbers of boxes in frames at these poses. sizes: centre in that frame, and half sizes."""
+    centers = posed(positions, rotations, sizes[:, :3])
+    return rows(centers, rotations, sizes[:, 3:6], width=NUMBERS)
 
 
 @inlined

@@ -10,36 +10,32 @@ from typing import Final
 from common.arrays import FloatArray, IntArray
 from robot_side.compiled.kernel import FLOAT64, building_block, compiled, inlined
 from robot_side.compiled.vectors import Vector, add, dot, norm, scale, subtract
-from robot_side.surroundings.kinds import box
 from robot_side.surroundings.kinds.convex_contact import convex_contact
 from robot_side.surroundings.kinds.ellipsoid_sections import reach_up, rolled, sum_slices
-from robot_side.surroundings.kinds.kind import Array, Check, Kind
+from robot_side.surroundings.kinds.kind import Array, Check, Kind, Placed
 from robot_side.surroundings.kinds.layout import (
+    NUMBERS,
     OVERLAP,
+    SHAPE_NUMBERS,
     Nearest,
+    around,
+    rows,
     to_metres,
-    write_pose,
 )
 
 _NEWTON_STEPS: Final = 60
 
 
-@inlined
-def place(numbers: FloatArray, k: int, bounds: FloatArray, row: int) -> float:
-    """Write the bounding sphere of one ellipsoid; return the ellipsoid's volume in m³."""
-    volume = box.place(numbers, k, bounds, row)
-    bounds[row, 3] = max(numbers[k, 12], numbers[k, 13], numbers[k, 14])
-    return math.pi / 6.0 * volume
+def place(numbers: FloatArray) -> Placed:
+    """Return the ellipsoids (k) with these numbers (k, 20)."""
+    half = numbers[:, 12:15]
+    volumes = 4.0 / 3.0 * math.pi * half[:, 0] * half[:, 1] * half[:, 2]
+    return Placed(numbers[:, :SHAPE_NUMBERS], around(numbers[:, :3], half.max(axis=1)), volumes)
 
 
-@inlined
-def placed(
-    sizes: FloatArray, k: int, position: Vector, turns: FloatArray, turn: int, numbers: FloatArray, row: int
-) -> None:
-    """Write the numbers of an ellipsoid at this pose. sizes: its half axes."""
-    write_pose(position, turns, turn, numbers, row)
-    for axis in range(3):
-        numbers[row, 12 + axis] = sizes[k, axis]
+def placed(sizes: FloatArray, positions: FloatArray, rotations: FloatArray) -> FloatArray:
+    """Return the numbers of ellipsoids at these poses. sizes: the half axes."""
+    return rows(positions, rotations, sizes[:, :3], width=NUMBERS)
 
 
 @inlined

@@ -3,33 +3,38 @@
 import math
 from typing import Final
 
+import numpy as np
+
 from common.arrays import FloatArray
 from robot_side.compiled.kernel import inlined
 from robot_side.compiled.vectors import Vector, dot, negative
 from robot_side.overlap.solids.half_space import half_space_overlap
 from robot_side.overlap.solids.solid import Overlap
-from robot_side.surroundings.kinds.kind import Array, Check, Kind
-from robot_side.surroundings.kinds.layout import CLOSING, LEAST_CONTACT_M, NEVER, TOUCHING_M, Contact, Nearest
+from robot_side.surroundings.kinds.kind import Array, Check, Kind, Placed
+from robot_side.surroundings.kinds.layout import (
+    CLOSING,
+    LEAST_CONTACT_M,
+    NEVER,
+    NUMBERS,
+    SHAPE_NUMBERS,
+    TOUCHING_M,
+    Contact,
+    Nearest,
+    around,
+    rows,
+)
 
 
-@inlined
-def place(_numbers: FloatArray, _k: int, bounds: FloatArray, row: int) -> float:
-    """Write the bounding sphere of one half-space, of infinite radius; return its volume, infinity."""
-    for axis in range(3):
-        bounds[row, axis] = 0.0
-    bounds[row, 3] = math.inf
-    return math.inf
+def place(numbers: FloatArray) -> Placed:
+    """Return the half-spaces (k) with these numbers (k, 20); bounds and volumes are infinite."""
+    infinite = np.full(len(numbers), math.inf)
+    return Placed(numbers[:, :SHAPE_NUMBERS], around(np.zeros((len(numbers), 3)), infinite), infinite)
 
 
-@inlined
-def placed(
-    _sizes: FloatArray, _k: int, position: Vector, turns: FloatArray, turn: int, numbers: FloatArray, row: int
-) -> None:
-    """Write the numbers of the half-space below a plane at this pose; the plane's normal is the pose's third axis."""
-    normal = turns[turn, 2], turns[turn, 5], turns[turn, 8]
-    for axis in range(3):
-        numbers[row, axis] = normal[axis]
-    numbers[row, 3] = dot(normal, position)
+def placed(_sizes: FloatArray, positions: FloatArray, rotations: FloatArray) -> FloatArray:
+    """Return the numbers of the half-spaces below planes at these poses; a plane's normal is its pose's third axis."""
+    normals = rotations[:, :, 2]
+    return rows(normals, (normals * positions).sum(axis=1), width=NUMBERS)
 
 
 @inlined

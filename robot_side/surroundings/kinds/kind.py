@@ -45,6 +45,17 @@ class Array(NamedTuple):
         return np.int64 if self.check is Check.INDEX else np.float64
 
 
+class Placed(NamedTuple):
+    """Primitives in the world."""
+
+    shapes: FloatArray
+    """(k, 15) numbers of the shape"""
+    bounds: FloatArray
+    """(k, 4) centre and radius of a sphere around each primitive"""
+    volumes_m3: FloatArray
+    """(k,)"""
+
+
 @dataclass(frozen=True, eq=False)
 class Kind:
     """Kind of primitive.
@@ -55,15 +66,13 @@ class Kind:
     name: str
     arrays: tuple[Array, ...]
     """Arrays of a frame with the poses and sizes of this kind's primitives"""
-    placed: Callable[..., None]
-    """Function (sizes (k, 20), k, position, turns (g, 9), turn, numbers (n, 20), row). It writes the numbers of a
-    primitive into `row`, from the sizes in row k and the pose: `position`, and the rotation in row `turn` of turns. It
-    is compiled, as are all functions below."""
-    place: Callable[..., float]
-    """Function (numbers, k, bounds (n, 4), row). It converts row k of the numbers to the primitive's shape, writes the
-    bounding sphere into `row` of the bounds, and returns the volume in m³."""
+    placed: Callable[[FloatArray, FloatArray, FloatArray], FloatArray]
+    """Function (sizes (k, 20), positions (k, 3), rotations (k, 3, 3)) that returns the numbers (k, 20) of primitives
+    with these sizes at these poses"""
+    place: Callable[[FloatArray], "Placed"]
+    """Function (numbers (k, 20)) that returns shapes, bounds and volumes"""
     nearest: Callable[..., Any]
-    """Function (shapes (n, 15), row, point) that returns a Nearest"""
+    """Function (shapes (n, 15), row, point) that returns a Nearest. It is compiled, as are all functions below."""
     contact: Callable[..., Any]
     """Function (shapes (n, 15), row, start, radius, along, reach) that returns a Contact"""
     overlap: Callable[..., Any] | None = None

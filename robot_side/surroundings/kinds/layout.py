@@ -39,6 +39,18 @@ ANY_DIRECTION: Final = (0.0, 0.0, 1.0)
 """Direction for a point that is equally far in all directions"""
 
 
+def around(centers: FloatArray, radii: FloatArray) -> FloatArray:
+    """Return the bounding spheres (k, 4) with these centres (k, 3) and radii (k,)."""
+    return np.concatenate([centers, radii[:, None]], axis=1)
+
+
+def lengths(vectors: FloatArray) -> FloatArray:
+    """Return the lengths (k, ...) of vectors (k, ..., 3), to the bit the same for one vector as for many."""
+    x, y, z = vectors[..., 0], vectors[..., 1], vectors[..., 2]
+    found: FloatArray = np.sqrt(x * x + y * y + z * z)
+    return found
+
+
 def rows(*columns: FloatArray, width: int = SHAPE_NUMBERS) -> FloatArray:
     """Return a table (k, width) with these columns (k, ...) side by side; the rest is 0."""
     count = len(columns[0])
@@ -76,23 +88,12 @@ def way_by(part: float) -> float:
     return 1.0 / part if abs(part) > 1e-15 else 1e15
 
 
-@inlined
-def posed(position: Vector, turns: FloatArray, k: int, x: float, y: float, z: float) -> Vector:
-    """Return in the world the point (x, y, z) of a frame at a pose: `position`, and rotation k of turns (g, 9)."""
-    return (
-        position[0] + (turns[k, 0] * x + turns[k, 1] * y + turns[k, 2] * z),
-        position[1] + (turns[k, 3] * x + turns[k, 4] * y + turns[k, 5] * z),
-        position[2] + (turns[k, 6] * x + turns[k, 7] * y + turns[k, 8] * z),
-    )
-
-
-@inlined
-def write_pose(position: Vector, turns: FloatArray, k: int, numbers: FloatArray, row: int) -> None:
-    """Write a position, and rotation k of turns (g, 9), as the first twelve numbers of `row`."""
-    for axis in range(3):
-        numbers[row, axis] = position[axis]
-    for entry in range(9):
-        numbers[row, 3 + entry] = turns[k, entry]
+def posed(positions: FloatArray, rotations: FloatArray, points: FloatArray) -> FloatArray:
+    """Return in the world the points (k, ..., 3) of frames at the poses `positions` (k, 3), `rotations` (k, 3, 3)."""
+    between = (1,) * (points.ndim - 2)
+    turned = (rotations.reshape(-1, *between, 3, 3) * points[..., None, :]).sum(axis=-1)
+    world: FloatArray = positions.reshape(-1, *between, 3) + turned
+    return world
 
 
 @inlined

@@ -11,33 +11,31 @@ from common.arrays import FloatArray, IntArray
 from robot_side.compiled.kernel import inlined
 from robot_side.compiled.vectors import Vector, dot, load, subtract
 from robot_side.surroundings.kinds import box
-from robot_side.surroundings.kinds.kind import Array, Check, Kind
-from robot_side.surroundings.kinds.layout import ENLARGED, NEVER, NUMBERS, TOUCHING_M, Contact, way_by, write_pose
+from robot_side.surroundings.kinds.kind import Array, Check, Kind, Placed
+from robot_side.surroundings.kinds.layout import (
+    ENLARGED,
+    NEVER,
+    NUMBERS,
+    SHAPE_NUMBERS,
+    TOUCHING_M,
+    Contact,
+    around,
+    posed,
+    rows,
+    way_by,
+)
 
 
-@inlined
-def place(numbers: FloatArray, k: int, bounds: FloatArray, row: int) -> float:
-    """Convert a mesh's numbers to those of the box around it, and write its bounding sphere; return its volume (m³)."""
-    x, y, z = numbers[k, 0], numbers[k, 1], numbers[k, 2]
-    for axis in range(3):
-        first = 3 + 3 * axis
-        u, v, w = numbers[k, first], numbers[k, first + 1], numbers[k, first + 2]
-        middle = u * numbers[k, 15] + v * numbers[k, 16] + w * numbers[k, 17]
-        bounds[row, axis] = (x if axis == 0 else y if axis == 1 else z) + middle
-    for axis in range(3):
-        numbers[k, axis] = bounds[row, axis]
-    bounds[row, 3] = numbers[k, 18]
-    return float(numbers[k, 19])
+def place(numbers: FloatArray) -> Placed:
+    """Return the meshes (k) with these numbers (k, 20), in the layout of the boxes around them."""
+    middles = posed(numbers[:, :3], numbers[:, 3:12].reshape(-1, 3, 3), numbers[:, 15:18])
+    shapes = np.concatenate([middles, numbers[:, 3:SHAPE_NUMBERS]], axis=1)
+    return Placed(shapes, around(middles, numbers[:, 18]), numbers[:, 19])
 
 
-@inlined
-def placed(
-    sizes: FloatArray, k: int, position: Vector, turns: FloatArray, turn: int, numbers: FloatArray, row: int
-) -> None:
-    """Write the numbers of a mesh at this pose. sizes: the 8 numbers that follow the pose (see `of_library`)."""
-    write_pose(position, turns, turn, numbers, row)
-    for entry in range(12, NUMBERS):
-        numbers[row, entry] = sizes[k, entry - 12]
+def placed(sizes: FloatArray, positions: FloatArray, rotations: FloatArray) -> FloatArray:
+    """Return the numbers of meshes at these poses. sizes: the 8 numbers that follow the pose (see `of_library`)."""
+    return rows(positions, rotations, sizes[:, :8], width=NUMBERS)
 
 
 def of_library(library: Any, index: IntArray) -> FloatArray:

@@ -8,26 +8,28 @@ from robot_side.compiled.kernel import inlined
 from robot_side.compiled.vectors import Vector, dot, norm, subtract, unit
 from robot_side.overlap.solids.ball import sphere_overlap
 from robot_side.overlap.solids.solid import Overlap
-from robot_side.surroundings.kinds.kind import Array, Check, Kind
-from robot_side.surroundings.kinds.layout import ANY_DIRECTION, LEAST_CONTACT_M, NEVER, TOUCHING_M, Contact, Nearest
+from robot_side.surroundings.kinds.kind import Array, Check, Kind, Placed
+from robot_side.surroundings.kinds.layout import (
+    ANY_DIRECTION,
+    LEAST_CONTACT_M,
+    NEVER,
+    NUMBERS,
+    SHAPE_NUMBERS,
+    TOUCHING_M,
+    Contact,
+    Nearest,
+    rows,
+)
 
 
-@inlined
-def place(numbers: FloatArray, k: int, bounds: FloatArray, row: int) -> float:
-    """Write the bounding sphere of one sphere; return its volume in m³."""
-    for axis in range(4):
-        bounds[row, axis] = numbers[k, axis]
-    return 4.0 / 3.0 * math.pi * float(numbers[k, 3] ** 3)
+def place(numbers: FloatArray) -> Placed:
+    """Return the spheres (k) with these numbers (k, 20)."""
+    return Placed(numbers[:, :SHAPE_NUMBERS], numbers[:, :4], 4.0 / 3.0 * math.pi * numbers[:, 3] ** 3)
 
 
-@inlined
-def placed(
-    sizes: FloatArray, k: int, position: Vector, _turns: FloatArray, _turn: int, numbers: FloatArray, row: int
-) -> None:
-    """Write the numbers of a sphere at this pose. sizes: its radius."""
-    for axis in range(3):
-        numbers[row, axis] = position[axis]
-    numbers[row, 3] = sizes[k, 0]
+def placed(sizes: FloatArray, positions: FloatArray, _rotations: FloatArray) -> FloatArray:
+    """Return the numbers of spheres at these positions. sizes: the radius."""
+    return rows(positions, sizes[:, 0], width=NUMBERS)
 
 
 @inlined

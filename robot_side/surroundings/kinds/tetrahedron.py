@@ -3,17 +3,24 @@
 import math
 from typing import Final
 
+import numpy as np
+
 from common.arrays import FloatArray, IntArray
 from robot_side.compiled.kernel import FLOAT64, building_block, compiled, inlined, power_of_two_below
 from robot_side.compiled.vectors import Vector, add, cross, dot, negative, norm, scale, subtract
 from robot_side.overlap.solids.tetrahedron_lane import tetrahedron_lane
 from robot_side.surroundings.kinds.convex_contact import convex_contact
-from robot_side.surroundings.kinds.kind import Array, Kind
+from robot_side.surroundings.kinds.kind import Array, Kind, Placed
 from robot_side.surroundings.kinds.layout import (
     ANY_DIRECTION,
+    NUMBERS,
     OVERLAP,
+    SHAPE_NUMBERS,
     Nearest,
+    around,
+    lengths,
     posed,
+    rows,
     to_metres,
 )
 
@@ -26,32 +33,20 @@ def _corner(shapes: FloatArray, row: int, k: int, point: Vector) -> Vector:
     return subtract((shapes[row, 3 * k], shapes[row, 3 * k + 1], shapes[row, 3 * k + 2]), point)
 
 
-@inlined
-def place(numbers: FloatArray, k: int, bounds: FloatArray, row: int) -> float:
-    """Write the bounding sphere of one tetrahedron; return the tetrahedron's volume in m³."""
-    for axis in range(3):
-        p, q, r, s = numbers[k, axis], numbers[k, 3 + axis], numbers[k, 6 + axis], numbers[k, 9 + axis]
-        bounds[row, axis] = 0.5 * (min(p, q, r, s) + max(p, q, r, s))
-    middle: Vector = (bounds[row, 0], bounds[row, 1], bounds[row, 2])
-    farthest = 0.0
-    for corner in range(4):
-        farthest = max(farthest, norm(_corner(numbers, k, corner, middle)))
-    bounds[row, 3] = farthest
-    first = numbers[k, 0], numbers[k, 1], numbers[k, 2]
-    a, b, c = _corner(numbers, k, 1, first), _corner(numbers, k, 2, first), _corner(numbers, k, 3, first)
-    return abs(dot(cross(a, b), c)) / 6.0
+def place(numbers: FloatArray) -> Placed:
+    """Return the tetrahedra (k) with these numbers (k, 20)."""
+    corners = numbers[:, :12].reshape(-1, 4, 3)
+    middles = 0.5 * (corners.min(axis=1) + corners.max(axis=1))
+    radii = lengths(corners - middles[:, None]).max(axis=1)
+    a, b, c = (corners[:, 1:] - corners[:, :1]).transpose(1, 2, 0)
+    across = a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+    volumes = np.abs(across[0] * c[0] + across[1] * c[1] + across[2] * c[2]) / 6.0
+    return Placed(numbers[:, :SHAPE_NUMBERS], around(middles, radii), volumes)
 
 
-@inlined
-def placed(
-    sizes: FloatArray, k: int, position: Vector, turns: FloatArray, turn: int, numbers: FloatArray, row: int
-) -> None:
-    """Write the numbers of a tetrahedron at this pose. sizes: its vertices in its own frame."""
-    for corner in range(4):
-        x, y, z = sizes[k, 3 * corner], sizes[k, 3 * corner + 1], sizes[k, 3 * corner + 2]
-        point = posed(position, turns, turn, x, y, z)
-        for axis in range(3):
-            numbers[row, 3 * corner + axis] = point[axis]
+def placed(sizes: FloatArray, positions: FloatArray, rotations: FloatArray) -> FloatArray:
+    """Return the numbers of tetrahedra at these poses. sizes: the vertices in that frame."""
+    return rows(posed(positions, rotations, sizes[:, :12].reshape(-1, 4, 3)), width=NUMBERS)
 
 
 @inlined

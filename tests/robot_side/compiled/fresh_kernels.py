@@ -7,7 +7,7 @@ from robot_side.compiled.kernel import Compiled, imported_kernels
 NAMES = (
     "robot_side.drivers.mujoco.encoders._read",
     "robot_side.arm.joint_estimate._estimate_loop",
-    "robot_side.surroundings.target._center",
+    "robot_side.drivers.mujoco.plant.sense",
 )
 
 
