@@ -7,15 +7,13 @@ import numpy as np
 
 from common.arrays import BoolArray, FloatArray
 from robot_side.arm.port import GripperPose
-from robot_side.arm.resolved_rate import refuse, resolve
-from robot_side.compiled.kernel import BOOL, FLOAT64, compiled, input_array, output_array, tuple_type
-from robot_side.compiled.stack import on_stack
+from robot_side.arm.resolved_rate import joint_velocities, velocities_for
 
 _MET = 1e-6
 """Largest deviation of the tool's motion from the commanded motion that counts as none, as a share of full speed"""
 _LEAST_SPEED_M_S = 1e-6
-_LEAST_RATE_RAD_S = 1e-9
-_twist = on_stack(6)
+_LEAST_S = 1e-9
+_NO_TURN = np.zeros(3)
 
 
 @dataclass(frozen=True)
@@ -58,47 +56,13 @@ def ability(pose: GripperPose, limits: JointLimits, direction: FloatArray, full_
 
     full_speed_m_s: v_max of the settings.
     """
-    speed_m_s, acceleration_m_s2, off_m_s = _find_ability(
-        *(pose.tool_jacobian, np.ascontiguousarray(direction), full_speed_m_s),
-        *(limits.velocity_rad_s, limits.acceleration_rad_s2, np.empty(limits.velocity_rad_s.size)),
-    )
-    if not speed_m_s > 0.0:
-        refuse(pose.tool_jacobian, full_speed_m_s * direction, limits.velocity_rad_s)
-    return Ability(speed_m_s, acceleration_m_s2, within_reach=off_m_s <= _MET * full_speed_m_s)
-
-
-@compiled(
-    *(input_array(2), input_array(1), FLOAT64, *(input_array(1),) * 2, output_array(1)),
-    returns=tuple_type(FLOAT64, FLOAT64, FLOAT64),
-)
-def _find_ability(
-    jacobian: FloatArray,
-    direction: FloatArray,
-    full_speed: float,
-    limits: FloatArray,
-    accelerations: FloatArray,
-    rates: FloatArray,
-) -> tuple[float, float, float]:
-    """Return the tool's speed, acceleration and largest deviation of its motion; the speed is 0 if `resolve` refuses.
-
-    jacobian (6, n), direction (3,), limits and accelerations (n,). rates (n,): scratch, the joints'.
-    """
-    twist = _twist()
-    for i in range(3):
-        twist[i], twist[3 + i] = full_speed * direction[i], 0.0
-    if not resolve(jacobian, twist, limits, rates):
-        return 0.0, 0.0, 0.0
-    speed, off, changing = 0.0, 0.0, _LEAST_RATE_RAD_S
-    for row in range(6):
-        given = 0.0
-        for joint in range(rates.size):
-            given += jacobian[row, joint] * rates[joint]
-        speed += given * direction[row] if row < 3 else 0.0
-        off = max(off, abs(given - twist[row]))
-    for joint in range(rates.size):
-        changing = max(changing, abs(rates[joint]) / accelerations[joint])
-    speed = max(speed, _LEAST_SPEED_M_S)
-    return speed, speed / changing, off
+    twist, jacobian = np.concatenate([full_speed_m_s * direction, _NO_TURN]), pose.tool_jacobian
+    rates = joint_velocities(jacobian, twist, limits.velocity_rad_s)
+    given = jacobian @ rates
+    speed_m_s = max(float(given[:3] @ direction), _LEAST_SPEED_M_S)
+    changing_s = max(float((np.abs(rates) / limits.acceleration_rad_s2).max()), _LEAST_S)
+    off = float(np.abs(given - twist).max())
+    return Ability(speed_m_s, speed_m_s / changing_s, within_reach=off <= _MET * full_speed_m_s)
 
 
 def along_approach(pose: GripperPose, limits: JointLimits, full_speed_m_s: float) -> Ability:
@@ -112,31 +76,7 @@ def change_times_s(pose: GripperPose, limits: JointLimits, twists: FloatArray) -
     A change Δ (5,) of travel and stick deflections takes max |K Δ|: the joint that changes most limits all. twists (5,
     6): from `tool_motion.full_twists`. ValueError as for `joint_velocities`.
     """
-    times_s = np.empty((len(twists), limits.velocity_rad_s.size))
-    jacobian, rotation = np.ascontiguousarray(pose.tool_jacobian), np.ascontiguousarray(pose.tool_rotation)
-    if not _find_change_times(jacobian, rotation, twists, limits.velocity_rad_s, limits.acceleration_rad_s2, times_s):
-        refuse(pose.tool_jacobian, twists[0], limits.velocity_rad_s)
-    return times_s.T
-
-
-@compiled(*(input_array(2),) * 3, *(input_array(1),) * 2, output_array(2), returns=BOOL)
-def _find_change_times(
-    jacobian: FloatArray,
-    rotation: FloatArray,
-    twists: FloatArray,
-    limits: FloatArray,
-    accelerations: FloatArray,
-    times: FloatArray,
-) -> bool:
-    for axis in range(twists.shape[0]):
-        twist, rates = _twist(), times[axis]
-        for i in range(6):
-            row, part = i % 3, i - i % 3
-            twist[i] = 0.0
-            for k in range(3):
-                twist[i] += rotation[row, k] * twists[axis, part + k]
-        if not resolve(jacobian, twist, limits, rates):
-            return False
-        for joint in range(limits.size):
-            rates[joint] /= accelerations[joint]
-    return True
+    turned = (twists.reshape(-1, 2, 3) @ pose.tool_rotation.T).reshape(-1, 6)
+    rates = velocities_for(pose.tool_jacobian, turned, limits.velocity_rad_s)
+    times_s: FloatArray = (rates / limits.acceleration_rad_s2).T
+    return times_s

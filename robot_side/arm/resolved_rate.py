@@ -12,8 +12,9 @@ from common.arrays import FloatArray, require_finite
 from robot_side.compiled.kernel import BOOL, building_block, compiled, inlined, input_array, output_array
 from robot_side.compiled.stack import on_stack
 
-_THRESHOLD_2: Final = 0.06 * 0.06
-"""Square of the smallest singular value below which damping begins"""
+_THRESHOLD: Final = 0.06
+"""Smallest singular value below which damping begins"""
+_THRESHOLD_2: Final = _THRESHOLD * _THRESHOLD
 _LARGEST_DAMPING: Final = 0.06
 _HALVINGS: Final = 60
 """Number of bisections by which the smallest eigenvalue is found to its last digit"""
@@ -34,20 +35,32 @@ def joint_velocities(
     mix metres and radians: σ_0 and λ_max suit an arm with a reach of about one metre.
     ValueError for a wrong shape, a limit that is not above 0, or a value that is not finite.
     """
-    if (jacobian.shape, twist.shape) != ((6, velocity_limits_rad_s.size), (6,)):
+    found: FloatArray = velocities_for(jacobian, twist[None], velocity_limits_rad_s)[0]
+    return found
+
+
+def velocities_for(jacobian: FloatArray, twists: FloatArray, velocity_limits_rad_s: FloatArray) -> FloatArray:
+    """Return the joint velocities (m, n) for each of the twists (m, 6), as `joint_velocities` does."""
+    if (jacobian.shape, twists.shape[1:]) != ((6, velocity_limits_rad_s.size), (6,)):
         raise ValueError(
-            f"jacobian has the shape {jacobian.shape}, and twist {twist.shape};"
+            f"jacobian has the shape {jacobian.shape}, and twist {twists.shape[1:]};"
             f" valid: (6, {velocity_limits_rad_s.size}) and (6,)"
         )
-    velocity = np.empty(jacobian.shape[1])
-    if not _resolve_loop(*map(np.ascontiguousarray, (jacobian, twist, velocity_limits_rad_s)), velocity):
-        refuse(jacobian, twist, velocity_limits_rad_s)
-    return velocity
+    found: FloatArray = np.empty((len(twists), jacobian.shape[1]))
+    given = map(np.ascontiguousarray, (jacobian, twists, velocity_limits_rad_s))
+    if not _resolve(*given, found):
+        _refuse(jacobian, twists, velocity_limits_rad_s)
+    return found
 
 
-def refuse(jacobian: FloatArray, twist: FloatArray, velocity_limits_rad_s: FloatArray) -> NoReturn:
-    """Raise a ValueError that names the argument because of which `resolve` returned False."""
-    for name, values in (("jacobian", jacobian), ("twist", twist)):
+def is_damped(jacobian: FloatArray) -> bool:
+    """Return whether `joint_velocities` damps here, because the Jacobian (6, n) is near a singularity."""
+    return float(np.linalg.svd(jacobian, compute_uv=False)[-1]) <= _THRESHOLD
+
+
+def _refuse(jacobian: FloatArray, twists: FloatArray, velocity_limits_rad_s: FloatArray) -> NoReturn:
+    """Raise a ValueError that names the argument because of which `_resolve` returned False."""
+    for name, values in (("jacobian", jacobian), ("twist", twists)):
         require_finite(name, values)
     if not (velocity_limits_rad_s > 0.0).all():
         raise ValueError("velocity_limits_rad_s holds a value that is not above 0; valid: values above 0, in rad/s")
@@ -125,21 +138,7 @@ def _fill_gram(jacobian: FloatArray, wide: bool, gram: FloatArray) -> None:
 
 
 @building_block
-def is_damped(jacobian: FloatArray) -> bool:
-    """Return whether `resolve` damps here, because the Jacobian (6, n) is near a singularity."""
-    wide, size = jacobian.shape[1] >= 6, min(jacobian.shape[1], 6)
-    gram = _gram()[:size, :size]
-    _fill_gram(jacobian, wide, gram)
-    return not _factorise(gram, _THRESHOLD_2, _factor())
-
-
-@building_block
-def resolve(
-    jacobian: FloatArray,
-    twist: FloatArray,
-    limits: FloatArray,
-    velocity: FloatArray,
-) -> bool:
+def _resolve_one(jacobian: FloatArray, twist: FloatArray, limits: FloatArray, velocity: FloatArray) -> bool:
     """Fill `velocity` (n,) as `joint_velocities` does; False for values that are not finite or limits not above 0.
 
     Solve the normal equations of the shorter side: (J Jᵀ + λ² I) y = v and q = Jᵀ y, or with fewer than six joints (JᵀJ
@@ -176,11 +175,9 @@ def _limit(velocity: FloatArray, limits: FloatArray) -> bool:
     return True
 
 
-@compiled(input_array(2), input_array(1), input_array(1), output_array(1), returns=BOOL)
-def _resolve_loop(
-    jacobian: FloatArray,
-    twist: FloatArray,
-    limits: FloatArray,
-    velocity: FloatArray,
-) -> bool:
-    return resolve(jacobian, twist, limits, velocity)
+@compiled(input_array(2), input_array(2), input_array(1), output_array(2), returns=BOOL)
+def _resolve(jacobian: FloatArray, twists: FloatArray, limits: FloatArray, velocities: FloatArray) -> bool:
+    found = True
+    for k in range(twists.shape[0]):
+        found = found and _resolve_one(jacobian, twists[k], limits, velocities[k])
+    return found
