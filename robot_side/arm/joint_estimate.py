@@ -12,7 +12,6 @@ import numpy as np
 
 from common.arrays import FloatArray
 from robot_side.arm.port import ArmState
-from robot_side.compiled.kernel import BOOL, FLOAT64, compiled, input_array, output_array
 
 TIME_CONSTANT_S = 0.02
 _LOST_S = 0.1
@@ -44,14 +43,21 @@ class JointEstimate:
             return self._begin(measured)
         if since_s == 0.0:
             return last
-        joints, fingers = np.empty(measured.joint_positions_rad.size), np.empty(measured.finger_positions.size)
-        if not _estimate_loop(
-            *(since_s, 1.0 - math.exp(-since_s / TIME_CONSTANT_S)),
-            *(last.joint_positions_rad, last.joint_velocities_rad_s, last.finger_positions),
-            *(measured.joint_positions_rad, measured.joint_velocities_rad_s, measured.finger_positions),
-            *(joints, fingers, self._finger_velocities),
-        ):
+        fingers_there = measured.finger_positions.shape == last.finger_positions.shape
+        if not (fingers_there and measured.joint_positions_rad.shape == last.joint_positions_rad.shape):
             return self._begin(measured)
+        velocities = last.joint_velocities_rad_s + measured.joint_velocities_rad_s
+        joints = last.joint_positions_rad + 0.5 * since_s * velocities
+        fingers = last.finger_positions + since_s * self._finger_velocities
+        joints_off, fingers_off = measured.joint_positions_rad - joints, measured.finger_positions - fingers
+        # NaN fails the comparison.
+        if not ((np.abs(joints_off) < _LOST).all() and (np.abs(fingers_off) < _LOST).all()):
+            return self._begin(measured)
+        share = 1.0 - math.exp(-since_s / TIME_CONSTANT_S)
+        joints, fingers = joints + share * joints_off, fingers + share * fingers_off
+        # Gain of an α-β filter that neither overshoots nor lags behind a steady motion.
+        drawn = share * share / (2.0 - share) / since_s
+        self._finger_velocities = self._finger_velocities + drawn * fingers_off
         self._last = ArmState(
             measured.time_s,
             joints,
@@ -90,42 +96,3 @@ class JointEstimate:
     def _begin(self, measured: ArmState) -> ArmState:
         self._last, self._finger_velocities = measured, np.zeros_like(measured.finger_positions)
         return measured
-
-
-@compiled(
-    *(FLOAT64, FLOAT64, input_array(1), input_array(1), input_array(1), input_array(1), input_array(1), input_array(1)),
-    *(output_array(1), output_array(1), output_array(1)),
-    returns=BOOL,
-)
-def _estimate_loop(
-    since: float,
-    share: float,
-    last_joints: FloatArray,
-    last_velocities: FloatArray,
-    last_fingers: FloatArray,
-    read_joints: FloatArray,
-    velocities: FloatArray,
-    read_fingers: FloatArray,
-    joints: FloatArray,
-    fingers: FloatArray,
-    finger_velocities: FloatArray,
-) -> bool:
-    """Fill `joints` (n,) and `fingers` (f,), update `finger_velocities` (f,); False if a reading is too far off."""
-    near = last_joints.size == last_velocities.size == velocities.size == joints.size
-    near &= last_fingers.size == finger_velocities.size == fingers.size
-    if not near:
-        return False
-    for joint in range(joints.size):
-        expected = last_joints[joint] + 0.5 * since * (last_velocities[joint] + velocities[joint])
-        off = read_joints[joint] - expected
-        near &= abs(off) < _LOST
-        joints[joint] = expected + share * off
-    # Gain of an α-β filter that neither overshoots nor lags behind a steady motion.
-    drawn = share * share / (2.0 - share) / since
-    for finger in range(fingers.size):
-        expected = last_fingers[finger] + since * finger_velocities[finger]
-        off = read_fingers[finger] - expected
-        near &= abs(off) < _LOST
-        fingers[finger] = expected + share * off
-        finger_velocities[finger] += drawn * off
-    return near

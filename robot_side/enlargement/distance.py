@@ -3,18 +3,21 @@
 import math
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import overload
+from statistics import NormalDist
+from typing import Final, overload
 
 import numpy as np
 import numpy.typing as npt
-from scipy.special import ndtri
 
 from common.arrays import FloatArray, require_finite
 from common.errors import ConfigurationError
-from robot_side.compiled.kernel import compiled, inlined, input_array, output_array
+from robot_side.compiled.kernel import inlined
 from robot_side.enlargement.prediction_errors import PredictionErrors
 
 Vector3 = tuple[float, float, float]
+
+
+_inverse: Final = np.vectorize(NormalDist().inv_cdf, otypes=[np.float64])
 
 
 def standard_quantile(probability: npt.ArrayLike) -> FloatArray:
@@ -22,7 +25,7 @@ def standard_quantile(probability: npt.ArrayLike) -> FloatArray:
     p = np.asarray(probability, dtype=np.float64)
     if not ((p > 0.0) & (p < 1.0)).all():
         raise ValueError(f"probability = {p} is outside (0, 1); valid: 0 < probability < 1")
-    return np.asarray(ndtri(p))
+    return np.asarray(_inverse(p))
 
 
 def _non_negative(name: str, value: npt.ArrayLike) -> FloatArray:
@@ -65,10 +68,7 @@ def enlargement_distance(
     mean = _non_negative("mean_m", mean_m)
     variance = _non_negative("variance_m2", variance_m2)
     delay = _non_negative("delay_displacement_m", delay_displacement_m)
-    arguments = np.broadcast_arrays(mean, variance, z)
-    distance = np.empty(arguments[0].shape)
-    _statistical_loop(*(np.ascontiguousarray(one).ravel() for one in arguments), distance.reshape(-1))
-    distance = delay + distance
+    distance = delay + np.maximum(mean + z * np.sqrt(variance), 0.0)
     return float(distance) if np.ndim(distance) == 0 else distance
 
 
@@ -76,12 +76,6 @@ def enlargement_distance(
 def statistical_distance(mean: float, variance: float, quantile: float) -> float:
     """Return D_σ = max(0, μ + Φ⁻¹(P) √σ²), lengths in m (eq. 9-10); all laws and explanations use this one formula."""
     return max(0.0, mean + quantile * math.sqrt(variance))
-
-
-@compiled(input_array(1), input_array(1), input_array(1), output_array(1))
-def _statistical_loop(mean: FloatArray, variance: FloatArray, quantile: FloatArray, distances: FloatArray) -> None:
-    for k in range(distances.size):
-        distances[k] = statistical_distance(mean[k], variance[k], quantile[k])
 
 
 @dataclass(frozen=True)

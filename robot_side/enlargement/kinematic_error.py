@@ -3,7 +3,6 @@
 import numpy as np
 
 from common.arrays import FloatArray
-from robot_side.compiled.kernel import compiled, input_array, output_array
 
 
 def position_covariance(jacobians: FloatArray, encoder_sigma_rad: FloatArray) -> FloatArray:
@@ -15,23 +14,8 @@ def position_covariance(jacobians: FloatArray, encoder_sigma_rad: FloatArray) ->
     """
     if encoder_sigma_rad.shape != jacobians.shape[2:]:
         raise ValueError(f"encoder_sigma_rad has the shape {encoder_sigma_rad.shape}; valid: {jacobians.shape[2:]}")
-    covariances = np.empty((len(jacobians), 3, 3))
-    _covariance_loop(np.ascontiguousarray(jacobians), np.ascontiguousarray(encoder_sigma_rad), covariances)
+    covariances: FloatArray = (jacobians * np.square(encoder_sigma_rad)) @ jacobians.swapaxes(1, 2)
     return covariances
-
-
-@compiled(input_array(3), input_array(1), output_array(3))
-def _covariance_loop(jacobians: FloatArray, sigma: FloatArray, covariances: FloatArray) -> None:
-    """Fill the covariance Σ_ee (m, 3, 3) of each point."""
-    for point in range(jacobians.shape[0]):
-        for row in range(3):
-            for column in range(row + 1):
-                covariance = 0.0
-                for joint in range(sigma.size):
-                    variance = sigma[joint] * sigma[joint]
-                    covariance += jacobians[point, row, joint] * variance * jacobians[point, column, joint]
-                covariances[point, row, column] = covariance
-                covariances[point, column, row] = covariance
 
 
 def directional_variance(covariances: FloatArray, directions: FloatArray) -> FloatArray:

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from common.arrays import FloatArray
-from robot_side.compiled.kernel import FLOAT64, compiled, inlined, input_array, output_array
+from robot_side.compiled.kernel import inlined
 
 
 class Encoder:
@@ -24,8 +24,9 @@ class Encoder:
 
     def read(self, true_positions: FloatArray) -> FloatArray:
         """Return the readings (n,) of joints at `true_positions` (n,), in radians; metres for a prismatic joint."""
-        readings = self.noise(true_positions.size)
-        _read(readings, true_positions, self.sigma_rad, self.resolution_rad)
+        readings = true_positions + self.sigma_rad * self.noise(true_positions.size)
+        if self.resolution_rad > 0.0:
+            readings = np.rint(readings / self.resolution_rad) * self.resolution_rad
         return readings
 
     def noise(self, count: int) -> FloatArray:
@@ -43,10 +44,3 @@ def reading(noise: float, true_position: float, sigma: float, resolution: float)
     """Return a reading of `true_position`; noise: a standard normal number."""
     read = noise * sigma + true_position
     return np.rint(read / resolution) * resolution if resolution > 0.0 else read
-
-
-@compiled(output_array(1), input_array(1), FLOAT64, FLOAT64)
-def _read(readings: FloatArray, true_positions: FloatArray, sigma: float, resolution: float) -> None:
-    """Replace standard normal noise in `readings` by the readings with this noise."""
-    for i in range(readings.size):
-        readings[i] = reading(readings[i], true_positions[i], sigma, resolution)

@@ -10,7 +10,7 @@ from msgspec import Meta
 from common.arrays import BoolArray, FloatArray
 from common.limits import check_limits
 from robot_side.arm.ability import JointLimits
-from robot_side.compiled.kernel import BOOL, FLOAT64, building_block, compiled, input_array, record_array
+from robot_side.compiled.kernel import building_block
 
 REFERENCE: Final = np.dtype(
     [
@@ -106,8 +106,10 @@ class JointReference:
             raise ValueError(f"joint_velocity_rad_s has the shape {velocity_rad_s.shape}; valid: {self.joints.shape}")
         if not math.isfinite(valid_until_s):
             raise ValueError(f"valid_until_s = {valid_until_s}; valid: a finite time")
-        if not _command(self.joints, velocity_rad_s, self.limits.velocity_rad_s):
+        largest = float(np.abs(velocity_rad_s).max(initial=0.0))
+        if not math.isfinite(largest):
             raise ValueError("joint_velocity_rad_s holds NaN or infinity; valid: finite numbers")
+        self.joints["command"] = velocity_rad_s / max(largest / self.limits.velocity_rad_s, 1.0)
         self._valid_until_s = valid_until_s
 
     def expire(self) -> None:
@@ -118,19 +120,6 @@ class JointReference:
         """Return whether there is a command to follow at `time_s`, and whether it has expired since the last call."""
         before, self._following = self._following, time_s < self._valid_until_s
         return self._following, before and not self._following
-
-
-@compiled(record_array(REFERENCE), input_array(1), FLOAT64, returns=BOOL)
-def _command(joints: Any, velocity: FloatArray, fastest: float) -> bool:
-    """Store the velocities, scaled by one factor to at most `fastest`; False, and no change, if one is not finite."""
-    largest = 0.0
-    for j in range(joints.size):
-        if not math.isfinite(velocity[j]):
-            return False
-        largest = max(largest, abs(velocity[j]))
-    for j in range(joints.size):
-        joints[j].command = velocity[j] / max(largest / fastest, 1.0)
-    return True
 
 
 @building_block
