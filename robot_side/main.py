@@ -35,7 +35,7 @@ from robot_side.viewing.scene_view import SceneView
 from robot_side.viewing.shapes import SceneModel
 
 _COMPILING: Final = (
-    "compiling for this processor, half a minute at the first start (or beforehand: feelahead doctor --compile):"
+    "compiling for this processor, some ten seconds at the first start (or beforehand: feelahead doctor --compile):"
     " {} of {} kernels are ready"
 )
 _REMEDY: Final = "fewer or simpler objects, a coarser cover (cover_m), fewer views and observers, or a faster machine"

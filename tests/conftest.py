@@ -18,14 +18,12 @@ single_threaded_algebra()
 STARTS = {"subprocess.Popen", "os.fork", "os.posix_spawn"}
 FONTS = "fc-list"
 """Program that matplotlib runs once on each machine, before its first figure; any test may start it"""
-KERNELS = "robot_side.compiled.helper_processes"
-"""Module that compiles the kernels once on each machine, before a test that needs them; any test may start it"""
 unmarked: list[str] = []
 """Name of the running test if it has neither marker, `processes` nor `install`; otherwise empty"""
 
 
 def refuse_processes(event: str, arguments: tuple[Any, ...]) -> None:
-    if unmarked and event in STARTS and arguments[0] != FONTS and KERNELS not in arguments[1]:
+    if unmarked and event in STARTS and arguments[0] != FONTS:
         raise AssertionError(f"{unmarked[0]} starts a process and carries neither marker, processes nor install")
 
 

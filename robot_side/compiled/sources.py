@@ -40,11 +40,6 @@ def digest(function: Callable[..., Any]) -> str:
     return result.hexdigest()
 
 
-def code_sizes(function: Callable[..., Any]) -> dict[FunctionType, int]:
-    """Return the size of the bytecode in bytes of `function` and of each function that is compiled with it."""
-    return {part: len(part.__code__.co_code) for part in _parts(function) if isinstance(part, FunctionType)}
-
-
 @functools.cache
 def _content(path: Path) -> bytes:
     return path.read_bytes()

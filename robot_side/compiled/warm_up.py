@@ -9,18 +9,12 @@ from pkgutil import walk_packages
 from typing import Final
 
 from common.clock import MonotonicClock
-from common.processors import usable_processors
-from robot_side.compiled.helper_processes import compile_in_helpers
 from robot_side.compiled.kernel import Compiled, imported_kernels
-from robot_side.compiled.machine_code import can_keep
-from robot_side.compiled.sources import code_sizes, digest
+from robot_side.compiled.sources import digest
 
 _NOTEWORTHY_S: Final = 1.0
 """Duration of a compilation after which it is announced"""
 _BETWEEN_NOTES_S: Final = 4.0
-_WORTH_A_PROCESS: Final = 20_000
-"""Bytes of bytecode above which helper processes are started. So many compile in some five seconds; a process starts in
-one."""
 
 
 def warm_up(
@@ -30,31 +24,19 @@ def warm_up(
 ) -> float:
     """Compile kernels, or load them from disk; return the duration in s. By default: all of the imported modules.
 
-    Without this the first call of each kernel does so, which takes up to seconds. If much is to be compiled, helper
-    processes share the work on the processors that this process may use; the rest is compiled here. `announce` is
-    called by a thread after a second of compilation, and then every 4 s, with the number of compiled kernels and of
-    all that were missing. `done` is called with the name of each kernel that has been compiled.
+    Without this the first call of each kernel does so, which takes up to seconds. `announce` is called by a thread
+    after a second of compilation, and then every 4 s, with the number of compiled kernels and of all that were missing.
+    `done` is called with the name of each kernel that has been compiled.
     """
     clock = MonotonicClock()
     start_s = clock.now()
     kernels = imported_kernels() if kernels is None else kernels
-    processors = usable_processors()
-    # Other processes find only the kernels of our modules.
-    missing = [kernel for kernel in kernels if kernel.is_ours and not (kernel.ready or kernel.is_kept)]
-    sizes = {part: size for kernel in missing for part, size in code_sizes(kernel.function).items()}
-    names = {kernel.name for kernel in missing}
-
-    def note_done(name: str) -> None:
-        names.discard(name)
-        done(name)
-
-    with _repeated(announce if missing else None, lambda: (len(missing) - len(names), len(missing))):
-        if processors > 1 and sum(sizes.values()) > _WORTH_A_PROCESS and can_keep():
-            compile_in_helpers(missing, processors, note_done)
+    missing = [kernel for kernel in kernels if not (kernel.ready or kernel.is_kept)]
+    with _repeated(announce if missing else None, lambda: (sum(one.ready for one in missing), len(missing))):
         for kernel in kernels:
             kernel.prepare()
             if kernel.cache_hits == 0:
-                note_done(kernel.name)
+                done(kernel.name)
     return clock.now() - start_s
 
 

@@ -32,7 +32,7 @@ ARROWS = """
     common/command: common common/emulation common/files common/protocol common/recording common/status
     common/loop: common common/command common/files common/realtime common/recording
 
-    robot_side/compiled: common common/companion common/files
+    robot_side/compiled: common common/files
     robot_side/overlap/checks: common
     robot_side/operators: common common/emulation common/protocol
     robot_side/tick/truth.py: common

@@ -43,7 +43,7 @@ class Host:
             "HOME": str(self.home),
             "PATH": f"{Path(sys.executable).parent}:{os.environ.get('PATH', '')}",
             "PYTHONPATH": str(ROOT),
-            "NUMBA_CACHE_DIR": str(machine_code_folder()),  # Each would compile for half a minute.
+            "NUMBA_CACHE_DIR": str(machine_code_folder()),  # Each would compile.
         }
         given = folders | variables
         return [*self.machine.surroundings, *self.clock, "env", *(f"{name}={value}" for name, value in given.items())]

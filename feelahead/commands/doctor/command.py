@@ -40,7 +40,7 @@ class DoctorSettings:
     machines' wall clocks need not agree.
 
     With --compile: compile the kernels of all scenes for this machine's processor now, instead of at the first start.
-    This takes about half a minute on two processors. The machine code is kept in $NUMBA_CACHE_DIR, else in
+    This takes half a minute or more. The machine code is kept in $NUMBA_CACHE_DIR, else in
     ~/.cache/feelahead/kernels; kernels that are already there stay. Exit code 1 if the folder cannot be written.
     """
 

@@ -75,7 +75,7 @@ def check_kernels(facts: KernelFacts | None) -> list[Finding]:
         return []
     if not facts.missing:
         return [Finding("kernels", Verdict.OK, f"{facts.kernels} compiled for this processor, in {facts.folder}")]
-    said, remedy = "the first start does, about half a minute", COMPILE
+    said, remedy = "the first start does, some ten seconds", COMPILE
     if not facts.writable:
         said = f"{facts.folder} keeps none: each start compiles, about a minute"
         remedy = f"let this user write to {facts.folder}, or set NUMBA_CACHE_DIR to another folder; then: {COMPILE}"

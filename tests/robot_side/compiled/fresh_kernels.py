@@ -5,9 +5,9 @@ from robot_side.compiled import kernel as compile_module
 from robot_side.compiled.kernel import Compiled, imported_kernels
 
 NAMES = (
-    "robot_side.drivers.mujoco.encoders._read",
-    "robot_side.arm.joint_estimate._estimate_loop",
     "robot_side.drivers.mujoco.plant.sense",
+    "robot_side.arm.resolved_rate._resolve",
+    "robot_side.field.total_overlap._sum_overlaps",
 )
 
 
