@@ -1,12 +1,12 @@
 """Calls from kernel to kernel by address. For an ordinary call Numba would compile the called kernel again."""
 
 from collections.abc import Callable
-from typing import Any, cast
+from typing import Any
 
 import numba
 import numba.extending
 
-from robot_side.compiled.kernel import INT64
+from robot_side.compiled.kernel import INT64, imported_kernels, intrinsic
 from robot_side.compiled.numba_inside import call_at
 
 
@@ -18,6 +18,10 @@ def call_at_address(returns: Any, arguments: tuple[Any, ...]) -> Callable[[int, 
     """
     wanted = returns(*arguments)
 
+    def look_up(address: int, given: tuple[Any, ...]) -> Any:
+        return next(kernel for kernel in imported_kernels() if kernel.address == address)(*given)
+
+    @intrinsic(look_up)
     def call(_typing: Any, _address: Any, given: Any) -> Any:
         if len(given) != len(wanted.args) or not all(map(_fits, given, wanted.args)):
             raise numba.TypingError(f"the kernel is called with arguments of the types {given}; valid: {wanted.args}")
@@ -29,7 +33,7 @@ def call_at_address(returns: Any, arguments: tuple[Any, ...]) -> Callable[[int, 
 
         return wanted.return_type(INT64, given), generate
 
-    return cast(Callable[[int, tuple[Any, ...]], Any], cast(Any, numba.extending.intrinsic)(call))
+    return call
 
 
 def _fits(given: Any, wanted: Any) -> bool:

@@ -3,7 +3,9 @@
 The arrays are declared once for Python and kernels. Passing one argument costs a fifth of passing twenty.
 """
 
+import ctypes
 import functools
+import math
 from collections.abc import Callable
 from typing import Any, Final, Generic, NamedTuple, TypeVar, cast
 
@@ -12,6 +14,7 @@ import numba.extending
 import numpy as np
 
 from common.arrays import IntArray
+from robot_side.compiled.kernel import as_in_kernels, intrinsic
 from robot_side.compiled.numba_inside import array_at, element_of
 
 _Columns = TypeVar("_Columns", bound=tuple[Any, ...])
@@ -86,6 +89,10 @@ class Declared(Generic[_Columns]):
 
 def _view(columns: Any, forms: tuple[Form, ...]) -> Any:
     # One intrinsic for all arrays: one call per array would take longer to compile than the code that uses them.
+    def read(bundle: IntArray) -> Any:
+        return columns(*(_array(form, *row) for form, row in zip(forms, bundle.tolist(), strict=True)))
+
+    @intrinsic(read)
     def at(_typing: Any, bundle: Any) -> Any:
         arrays = [numba.types.Array(numba.from_dtype(form.dtype), 1 + len(form.inner), "C") for form in forms]
         tuple_type = cast(Any, numba.types.BaseTuple).from_types(arrays, columns)
@@ -102,4 +109,11 @@ def _view(columns: Any, forms: tuple[Form, ...]) -> Any:
 
         return tuple_type(BUNDLE), generate
 
-    return cast(Any, numba.extending.intrinsic)(at)
+    return at
+
+
+def _array(form: Form, address: int, length: int) -> np.ndarray:
+    """Return the array of this form at an address."""
+    shape = length, *form.inner
+    memory = (ctypes.c_char * (math.prod(shape) * form.dtype.itemsize)).from_address(address)
+    return as_in_kernels(np.ndarray(shape, form.dtype, cast(Any, memory)))

@@ -6,9 +6,11 @@ Numba has no type hints. Through these decorators all other modules see ordinary
 import contextlib
 import functools
 import gc
+import math
 import operator
 import threading
 from collections.abc import Callable, Iterator
+from fractions import Fraction
 from typing import Any, TypeVar, cast
 
 import numba
@@ -86,39 +88,60 @@ INT64: Any = numba.types.int64
 _FOR_CALLERS: dict[str, Any] = {**_OPTIONS, "pipeline_class": WithoutMachineCode}
 
 
+JIT: bool = not cast(Any, numba.config).DISABLE_JIT
+"""False with NUMBA_DISABLE_JIT=1: kernels are then ordinary functions, which a debugger steps through"""
+
+
+def intrinsic(plain: _Function) -> Callable[[Callable[..., Any]], _Function]:
+    """Return a decorator that makes a function of kernels from one that emits LLVM code (`numba.extending.intrinsic`).
+
+    plain: the same in Python, used without `JIT`.
+    """
+    return lambda emit: cast(_Function, cast(Any, numba.extending.intrinsic)(emit) if JIT else plain)
+
+
 def inlined(function: _Function) -> _Function:
     """Compile `function` into each kernel that calls it."""
+    if not JIT:
+        return function
     return cast(_Function, ignore_constants(numba.njit(forceinline=True, **_FOR_CALLERS)(function)))
 
 
 def building_block(function: _Function) -> _Function:
     """Compile `function` once for all kernels that call it; LLVM decides whether it is inlined."""
+    if not JIT:
+        return function
     return cast(_Function, ignore_constants(numba.njit(**_FOR_CALLERS)(function)))
 
 
-def _fused_multiply_add(_typing: Any, _a: Any, _b: Any, _c: Any) -> Any:
+def _rounded_once(a: float, b: float, c: float) -> float:
+    return float(Fraction(a) * Fraction(b) + Fraction(c)) if math.isfinite(a + b + c) else a * b + c
+
+
+@intrinsic(_rounded_once)
+def fused_multiply_add(_typing: Any, _a: Any, _b: Any, _c: Any) -> Any:
+    """Return a · b + c with a single rounding (IEEE 754-2008, 5.4.1); in kernels only."""
+
     def generate(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
         return builder.fma(*arguments)
 
     return FLOAT64(FLOAT64, FLOAT64, FLOAT64), generate
 
 
-fused_multiply_add: Callable[[float, float, float], float] = cast(Any, numba.extending.intrinsic)(_fused_multiply_add)
-"""Function (a, b, c) that returns a · b + c with a single rounding (IEEE 754-2008, 5.4.1); in kernels only"""
+def _two_to_exponent(length: float) -> float:
+    return math.ldexp(1.0, math.frexp(length)[1] - 1)
 
 
-def _power_of_two_below(_typing: Any, _length: Any) -> Any:
+@intrinsic(_two_to_exponent)
+def power_of_two_below(_typing: Any, _length: Any) -> Any:
+    """Return the largest power of two at most equal to the argument, a positive normal float; in kernels only."""
+
     def generate(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
         integer, double = context.get_value_type(numba.types.int64), context.get_value_type(FLOAT64)
         exponent = builder.and_(builder.bitcast(arguments[0], integer), integer(0x7FF0000000000000))
         return builder.bitcast(exponent, double)
 
     return FLOAT64(FLOAT64), generate
-
-
-power_of_two_below: Callable[[float], float] = cast(Any, numba.extending.intrinsic)(_power_of_two_below)
-"""Function that returns the largest power of two at most equal to its argument, a positive normal float; in kernels
-only"""
 
 
 @contextlib.contextmanager
@@ -135,6 +158,11 @@ def _uncollected() -> Iterator[None]:
 
 _kernels: list["Compiled"] = []
 _told: list[Callable[[str], None]] = []
+
+
+def as_in_kernels(array: np.ndarray) -> np.ndarray:
+    """Return the array; if it has records, one whose records have their fields as attributes."""
+    return array.view(np.recarray) if array.dtype.names else array
 
 
 def imported_kernels() -> tuple["Compiled", ...]:
@@ -169,9 +197,9 @@ class Compiled:
         """Python function from which the kernel is compiled"""
         self.signature = (returns or numba.types.void)(*arguments)
         self._preparing = threading.Lock()
-        self.ready = False
+        self.ready = not JIT
         """Whether the kernel is compiled, so that the next call is as fast as any other"""
-        self._run: Callable[..., Any] = self._prepare_and_run
+        self._run: Callable[..., Any] = self._prepare_and_run if JIT else self._interpret
         _kernels.append(self)
 
     __call__: Any = property(operator.attrgetter("_run"))
@@ -199,7 +227,7 @@ class Compiled:
     @property
     def is_kept(self) -> bool:
         """Whether the kernel's machine code for this processor is on disk"""
-        return kept(self.name, self._key()) is not None
+        return not JIT or kept(self.name, self._key()) is not None
 
     def _key(self) -> str:
         # Computed on first use: only then does every building block exist.
@@ -209,9 +237,15 @@ class Compiled:
         self.prepare()
         return self._dispatcher(*arguments)
 
+    def _interpret(self, *arguments: Any) -> Any:
+        """Run the Python function itself. Records have their fields as attributes, as in kernels."""
+        return self.function(*(as_in_kernels(one) if isinstance(one, np.ndarray) else one for one in arguments))
+
     @property
     def address(self) -> int:
         """Address of the kernel's machine code, for `calls.call_at_address`; the kernel is compiled if necessary"""
+        if not JIT:
+            return id(self)
         if not self.ready:
             self.prepare()
         return entry_point(self._dispatcher, self.signature)
@@ -219,7 +253,7 @@ class Compiled:
     @property
     def cache_hits(self) -> int:
         """Number of times that the machine code came from the disk: 0 or 1"""
-        return sum(self._dispatcher.stats.cache_hits.values())
+        return sum(self._dispatcher.stats.cache_hits.values()) if JIT else 0
 
 
 def compiled(*arguments: Any, returns: Any = None) -> Callable[[Callable[..., Any]], Compiled]:

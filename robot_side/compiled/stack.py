@@ -2,13 +2,13 @@
 
 import math
 from collections.abc import Callable
-from typing import Any, cast
+from typing import Any
 
 import numba
 import numba.extending
 import numpy as np
 
-from robot_side.compiled.kernel import INT64
+from robot_side.compiled.kernel import INT64, as_in_kernels, intrinsic
 from robot_side.compiled.numba_inside import array_at, room_on_stack
 
 
@@ -20,6 +20,7 @@ def on_stack(*shape: int, dtype: Any = np.float64) -> Callable[[], np.ndarray]:
     """
     element = np.dtype(dtype)
 
+    @intrinsic(lambda: as_in_kernels(np.empty(shape, element)))
     def array(_typing: Any) -> Any:
         array_type = numba.types.Array(numba.from_dtype(element), len(shape), "C")
 
@@ -30,4 +31,4 @@ def on_stack(*shape: int, dtype: Any = np.float64) -> Callable[[], np.ndarray]:
 
         return array_type(), generate
 
-    return cast(Callable[[], np.ndarray], cast(Any, numba.extending.intrinsic)(array))
+    return array

@@ -4,23 +4,36 @@ LLVM would compile an ordinary loop to copies of single numbers. Then copying th
 as much as the bounds that are computed from them.
 """
 
-from collections.abc import Callable
-from typing import Any, cast
+from typing import Any
 
 import numba
-import numba.extending
 from llvmlite import ir
 
 from common.arrays import FloatArray
+from robot_side.compiled.kernel import intrinsic
 
 _INDEX = ir.IntType(64)
 _FOUR = ir.VectorType(ir.DoubleType(), 4)
 _DOUBLE_BYTES = 8
 
 
-def _transpose_four(
+def _four(
+    rows: FloatArray, first: int, second: int, third: int, fourth: int, columns: FloatArray, end: int, apart: int
+) -> None:
+    for lane, start in enumerate((first, second, third, fourth)):
+        columns[end + lane : end + lane + 3 * apart + 1 : apart] = rows[start : start + 4]
+
+
+@intrinsic(_four)
+def transpose_four(
     _typing: Any, rows: Any, _1: Any, _2: Any, _3: Any, _4: Any, columns: Any, _end: Any, _apart: Any
 ) -> Any:
+    """Transpose four rows of four numbers.
+
+    The rows begin at the indices `first` to `fourth` of the flat array `rows`. In the flat array `columns`, the first
+    column's four numbers go to the indices from `end` on, the next column's to those `apart` farther, and so on.
+    """
+
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         source, *starts, target, end, apart = arguments
         read, write = _access(context, builder, signature.args[0], source, signature.args[5], target)
@@ -37,7 +50,15 @@ def _transpose_four(
     return numba.types.void(rows, index, index, index, index, columns, index, index), generate
 
 
-def _transpose_three(_typing: Any, rows: Any, _start: Any, columns: Any, _end: Any, _apart: Any) -> Any:
+def _three(rows: FloatArray, start: int, columns: FloatArray, end: int, apart: int) -> None:
+    for number in range(3):
+        columns[end + number * apart : end + number * apart + 4] = rows[start + number : start + 12 : 3]
+
+
+@intrinsic(_three)
+def transpose_three(_typing: Any, rows: Any, _start: Any, columns: Any, _end: Any, _apart: Any) -> Any:
+    """Transpose four rows of three numbers, from `start` on, into three columns, as `transpose_four` does."""
+
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         source, start, target, end, apart = arguments
         read, write = _access(context, builder, signature.args[0], source, signature.args[2], target)
@@ -51,20 +72,6 @@ def _transpose_three(_typing: Any, rows: Any, _start: Any, columns: Any, _end: A
 
     index = numba.types.int64
     return numba.types.void(rows, index, columns, index, index), generate
-
-
-transpose_four: Callable[[FloatArray, int, int, int, int, FloatArray, int, int], None] = cast(
-    Any, numba.extending.intrinsic
-)(_transpose_four)
-"""Function (rows, first, second, third, fourth, columns, end, apart) that transposes four rows of four numbers. The
-rows begin at the indices `first` to `fourth` of the flat array `rows`. In the flat array `columns`, the first column's
-four numbers go to the indices from `end` on, the next column's to those `apart` farther, and so on."""
-
-transpose_three: Callable[[FloatArray, int, FloatArray, int, int], None] = cast(Any, numba.extending.intrinsic)(
-    _transpose_three
-)
-"""Function (rows, start, columns, end, apart) that transposes four consecutive rows of three numbers, from the index
-`start` on, into three columns, as `transpose_four` does"""
 
 
 def _access(context: Any, builder: Any, source_type: Any, source: Any, target_type: Any, target: Any) -> Any:
