@@ -30,8 +30,10 @@ _HOLDS_S: Final = 1.5
 are rare."""
 _SAME_TIME: Final = 0.05
 """Largest relative change of T, the time until the arm stands, after which the probes' looks still count"""
-_MOST: Final = 4
-"""Maximum number of probes' looks in one tick, so that no tick takes much longer than others"""
+_ANEW_S: Final = 0.1
+"""Time in which discarded looks are made again"""
+_LATE_S: Final = 0.02
+"""Longest pause that one tick makes up for, so that no tick takes much longer than others"""
 _ROUNDING: Final = 1e-6
 
 
@@ -72,6 +74,10 @@ class ProbeLooks:
         """Discard all looks, because the objects' classes or P have changed."""
         self._since_s = math.inf
 
+    def advance(self, now_s: float) -> None:
+        """Set the present time, to which approaching objects are carried."""
+        self._now_s = now_s
+
     def begin(self, until_s: float, now_s: float, *, traced: bool, moved: bool) -> None:
         """Begin a tick. Discard the looks if T has changed to another `until_s`.
 
@@ -108,8 +114,8 @@ class ProbeLooks:
         waited[self._at_s > self._moved_s] = -np.inf
         # A discarded look is due again at once: until then the operator side has the old map.
         waited[self._at_s < self._since_s] = np.inf
-        share = _MOST if self.waits else min(2.0 * PROBES * passed_s / PERIOD_S, _MOST)
-        most = math.ceil(share) if math.isfinite(passed_s) else 2 * PROBES
+        share = min(passed_s, _LATE_S) / (_ANEW_S if self.waits else PERIOD_S)
+        most = math.ceil(2.0 * PROBES * share) if math.isfinite(passed_s) else 2 * PROBES
         first = np.argsort(-waited, axis=None, kind="stable")[:most]
         return [divmod(one, PROBES) for one in first.tolist() if waited.flat[one] >= 1.0 - _ROUNDING]
 

@@ -50,7 +50,7 @@ class FingerSpeeds:
         It is measured every 8 ms. Spheres in another number are at rest at first.
         """
         measured = self._measured
-        if measured and len(measured[-1][1]) != len(pose.sphere_centers_m):
+        if measured and (len(measured[-1][1]) != len(pose.sphere_centers_m) or now_s < measured[-1][0]):
             measured.clear()
         if measured and now_s - measured[-1][0] + 1e-9 < _PERIOD_S:
             return self._speeds_m_s

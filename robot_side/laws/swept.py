@@ -32,9 +32,10 @@ from robot_side.field.field import Ahead
 from robot_side.field.object_class import SKIPPED
 from robot_side.field.scratch import Count
 from robot_side.laws.around import ProbeLooks
+from robot_side.laws.changes import differs, have_moved, is_due, rests
 from robot_side.laws.classes import classes_of
 from robot_side.laws.explanation import explained
-from robot_side.laws.gripper_motion import STILL_M_S, FingerSpeeds, gripper_motion
+from robot_side.laws.gripper_motion import FingerSpeeds, gripper_motion
 from robot_side.laws.law import MOST_M, require_usable
 from robot_side.laws.looking import Looking, Seen
 from robot_side.laws.path import Waypoint
@@ -45,13 +46,6 @@ from robot_side.tick.explained import Trigger, TriggerExplained
 from robot_side.tick.sensed import L2, R2, STICK, Sensed
 from robot_side.tick.situation import Situation
 
-LOOK_PERIOD_S: Final = 0.008
-"""Least time between two ticks that look, unless something has changed: a controller is written to every 10 ms"""
-REST_PERIOD_S: Final = 0.05
-"""Period of looks while everything rests"""
-_SAME_AGE_S: Final = 0.002
-"""Change of the loop age up to which looks at rest still count"""
-_ROUNDING_S: Final = 1e-9
 _AT_REST: Final[FloatArray] = np.empty((0, 3))
 
 
@@ -91,15 +85,19 @@ class SweptLaw:
         """
         require_usable(situation, len(self.looking.ahead.encoder_sigma_rad), now_s)
         seen, last = self._see(situation, self._fingers.measure(situation.pose, now_s), now_s), self._last
-        if last is None or _is_due(seen, last, waits=self.looking.probes is not None and self.looking.probes.waits):
-            other = last is None or last.classes is not seen.classes or last.assumed is not seen.assumed
-            if other and self.looking.probes is not None:
-                self.looking.probes.discard()
-            self.looking.look(seen, changed=last is None or _differs(seen, last) or _has_changed(seen, last))
+        probes = self.looking.probes
+        if probes is not None:
+            probes.advance(now_s)
+        if last is None or is_due(seen, last, waits=probes is not None and probes.waits):
+            if probes is not None and (
+                last is None or seen.classes is not last.classes or seen.assumed is not last.assumed
+            ):
+                probes.discard()
+            self.looking.look(seen, changed=last is None or differs(seen, last) or have_moved(seen, last))
             self._last = seen
         else:
             self._without_looks += 1
-            if self._sensed is not None and not seen.motion.moves and _same_age(seen, last):
+            if self._sensed is not None and rests(seen, last):
                 return self._sensed
         self._sensed = self._field(seen)
         return self._sensed
@@ -192,49 +190,3 @@ class SweptLaw:
     def asked(self, side: int, situation: Situation, waypoint: Waypoint | None = None) -> Asked:
         """Return the arguments of a look along one side, from the present pose or from a waypoint."""
         return self._see(situation, None, 0.0).prospect(side, waypoint).asked
-
-
-def _is_due(seen: Seen, last: Seen, *, waits: bool) -> bool:
-    """Return whether a tick looks: something moves or has changed, or the last looks are old.
-
-    waits: whether looks for the map are to be made again.
-    """
-    if _differs(seen, last):
-        return True
-    passed_s = seen.passed_s + _ROUNDING_S
-    if passed_s < LOOK_PERIOD_S:
-        return False
-    moves = seen.motion.moves or _has_changed(seen, last)
-    return moves or waits or passed_s >= REST_PERIOD_S or not _same_age(seen, last)
-
-
-def _same_age(seen: Seen, last: Seen) -> bool:
-    """Return whether the loop age is about that of the last tick that looked."""
-    return abs(seen.situation.loop_age_s - last.situation.loop_age_s) <= _SAME_AGE_S
-
-
-def _differs(seen: Seen, last: Seen) -> bool:
-    """Return whether what is looked at, and how, differs from the last tick that looked; motion does not count."""
-    now, then = seen.situation, last.situation
-    return (
-        seen.classes is not last.classes
-        or seen.assumed is not last.assumed
-        or seen.motion.moves != last.motion.moves
-        or len(now.pose.sphere_radii_m) != len(then.pose.sphere_radii_m)
-        or (now.compensation, now.loop_age_known) != (then.compensation, then.loop_age_known)
-        or (now.lateral == (0.0, 0.0)) != (then.lateral == (0.0, 0.0))
-    )
-
-
-def _has_changed(seen: Seen, last: Seen) -> bool:
-    """Return whether the gripper has other spheres, or objects may have moved since the last tick that looked."""
-    if len(seen.situation.pose.sphere_radii_m) != len(last.situation.pose.sphere_radii_m):
-        return True
-    objects = seen.situation.objects
-    if objects is last.situation.objects:
-        return False
-    velocities_m_s, since = objects.velocities_m_s, objects.since
-    if velocities_m_s is None:
-        return True
-    moving_m_s = velocities_m_s if since is None else velocities_m_s[since[0].things]
-    return bool(np.abs(moving_m_s).max(initial=0.0) > STILL_M_S)

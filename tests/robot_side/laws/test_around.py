@@ -148,8 +148,21 @@ def test_looks_that_are_made_again_are_spread_over_ticks_and_soon_complete(law: 
     looks(law, 1000, np.zeros(6), 0.0)
     law.expect(0.9)
     made = [looks(law, 1, np.zeros(6), 1.0 + 0.004 * tick) for tick in range(25)]
-    assert max(made) <= 6
+    assert max(made) <= 11
     assert law.around(ball_pose()) is not None
+
+
+def test_the_map_follows_what_approaches_between_two_looks(law: SweptLaw) -> None:
+    comes = replace(walls(0.45), velocities_m_s=np.array([[0.0, 0.0, -0.5]]))
+    told = []
+    for tick in range(12):
+        law.sense(situation(ball_pose(), comes, loop_age_s=LOOP_S), 1.0 + 0.004 * tick)
+        told.append(law.around(ball_pose()))
+    first, last = told[0], told[-1]
+    assert first is not None
+    assert last is not None
+    nearer_m = Told(0.0, *first.onsets_m(1.0)).r2_m - Told(0.0, *last.onsets_m(1.0)).r2_m
+    np.testing.assert_allclose(nearer_m, 0.5 * 11 * 0.004, atol=4e-3)
 
 
 def test_what_has_just_appeared_straight_ahead_is_in_the_next_map(law: SweptLaw) -> None:

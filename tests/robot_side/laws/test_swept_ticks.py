@@ -65,7 +65,9 @@ def test_at_rest_looks_are_rare_until_something_moves(watched: Watched) -> None:
         {"held": 0},
         {"compensation": "robot"},
         {"loop_age_s": 0.11},
-        {"objects": replace(walls(0.1), velocities_m_s=None)},
+        {"astray_m_s": 0.1},
+        {"objects": replace(walls(0.06), velocities_m_s=np.zeros((1, 3)))},
+        {"pose": ball_pose(tool_position_m=[0.0, 0.0, 0.05])},
         {"pose": free_pose([[0.0, 0.0, 0.0]] * 2, [0.008] * 2)},
     ],
     ids=lambda changes: str(next(iter(changes))),
@@ -75,6 +77,17 @@ def test_a_change_is_looked_at_in_the_next_tick(watched: Watched, changes: dict[
     looks = watched.ticks(0.004, 3, **changes)
     assert looks[0] >= 2
     assert looks[1:] == [0, 0]
+
+
+def test_a_stick_that_is_swapped_is_looked_along_at_once(watched: Watched) -> None:
+    assert watched.ticks(0.004, 3, lateral=(1.0, 0.0)) == [3, 0, 0]
+    assert watched.ticks(0.004, 3, lateral=(-1.0, 0.0)) == [3, 0, 0]
+
+
+def test_a_clock_that_goes_back_stops_no_looks(watched: Watched) -> None:
+    watched.ticks(0.004, 3)
+    watched.now_s -= 10.0
+    assert watched.ticks(0.004, 1) == [2]
 
 
 def test_another_probability_is_looked_at_in_the_next_tick(watched: Watched) -> None:
