@@ -13,8 +13,6 @@ REST_PERIOD_S: Final = 0.05
 """Period of looks while everything rests"""
 _SAME_AGE_S: Final = 0.002
 """Change of the loop age up to which looks at rest still count"""
-_SAME_M: Final = 1e-4
-"""Displacement of an object up to which it counts as at rest"""
 _REST_M: Final = 1e-3
 """Displacement of the tool, and change of the gap between the fingers, up to which looks at rest still count"""
 _SAME_STICK: Final = 0.1
@@ -58,13 +56,12 @@ def differs(seen: Seen, last: Seen) -> bool:
 
 def have_moved(seen: Seen, last: Seen) -> bool:
     """Return whether objects may have moved since the last tick that looked, or move now."""
-    objects, before = seen.situation.objects, last.situation.objects
-    if objects is before:
+    objects = seen.situation.objects
+    if objects is last.situation.objects:
         return False
-    if objects.since is None or before.since is None or objects.since[0] is not before.since[0]:
-        # Any object may be elsewhere: a driver need not give velocities.
+    velocities_m_s, since = objects.velocities_m_s, objects.since
+    if velocities_m_s is None:
+        # Without velocities any object may be elsewhere in each new frame.
         return True
-    (movers, numbers), velocities_m_s = objects.since, objects.velocities_m_s
-    if np.abs(numbers - before.since[1]).max(initial=0.0) > _SAME_M or velocities_m_s is None:
-        return True
-    return bool(np.abs(velocities_m_s[movers.things]).max(initial=0.0) > STILL_M_S)
+    moving_m_s = velocities_m_s if since is None else velocities_m_s[since[0].things]
+    return bool(np.abs(moving_m_s).max(initial=0.0) > STILL_M_S)

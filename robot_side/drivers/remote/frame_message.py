@@ -40,7 +40,7 @@ class SeenObject(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     position_m: _Three = (0.0, 0.0, 0.0)
     quaternion: tuple[_Coordinate, _Coordinate, _Coordinate, _Coordinate] = (1.0, 0.0, 0.0, 0.0)
     """Orientation: quaternion from the object's frame to the world, w first"""
-    velocity_m_s: _Three = (0.0, 0.0, 0.0)
+    velocity_m_s: _Three | None = None
     mean_m: _Three = (0.0, 0.0, 0.0)
     """Mean error of the position in m, true minus perceived, per axis"""
     sd_m: Annotated[float, Meta(ge=0.0, le=1.0)] = 0.0
@@ -111,9 +111,16 @@ def perceived(things: Sequence[SeenObject], roles: Sequence[Role], time_s: float
         roles=tuple(roles),
         positions_m=positions,
         rotations=np.ascontiguousarray(turned),
-        velocities_m_s=_rows(thing.velocity_m_s for thing in things),
+        velocities_m_s=_velocities(things),
         **arrays,
     )
+
+
+def _velocities(things: Sequence[SeenObject]) -> FloatArray | None:
+    """Return the objects' velocities (k, 3), 0 for those without one; None if no object has one."""
+    if all(thing.velocity_m_s is None for thing in things):
+        return None
+    return _rows(thing.velocity_m_s or (0.0, 0.0, 0.0) for thing in things)
 
 
 def _primitives(thing: SeenObject, position: FloatArray, turned: FloatArray) -> tuple[str, list[dict[str, Any]]]:

@@ -61,7 +61,7 @@ def test_looks_of_the_demo_are_noted_and_another_law_is_noticed(monkeypatch: pyt
     assert 20 < len(asked) <= 40
     found = compare(asked, encoder_sigma_rad).row()
     assert found["looks"] == len(asked)
-    assert found["distances"] > 200
+    assert found["distances"] > 100
     assert (found["late"], found["out_of_band"]) == (0, 0)
     assert found["sigma_off_mm"] < 1e-9
     monkeypatch.setattr(onsets_by_definition, "MARGIN_M", 0.0125)

@@ -66,7 +66,7 @@ def test_at_rest_looks_are_rare_until_something_moves(watched: Watched) -> None:
         {"compensation": "robot"},
         {"loop_age_s": 0.11},
         {"astray_m_s": 0.1},
-        {"objects": replace(walls(0.06), velocities_m_s=np.zeros((1, 3)))},
+        {"objects": walls(0.06)},
         {"pose": ball_pose(tool_position_m=[0.0, 0.0, 0.05])},
         {"pose": free_pose([[0.0, 0.0, 0.0]] * 2, [0.008] * 2)},
     ],
