@@ -25,7 +25,7 @@ from numba.core.typed_passes import (
     NopythonTypeInference,
     PreLowerStripPhis,
 )
-from numba.core.types import BooleanLiteral, Function, IntegerLiteral
+from numba.core.types import BooleanLiteral, IntegerLiteral
 from numba.core.untyped_passes import FixupArgs, GenericRewrites, IRProcessing, ReconstructSSA, TranslateByteCode
 from numba.np.arrayobj import get_itemsize, make_array, populate_array
 
@@ -117,22 +117,6 @@ class WithoutMachineCode(CompilerBase):
         flags = self.state.flags
         flags.no_cpython_wrapper = flags.no_cfunc_wrapper = flags.no_compile = True
         return _pipeline(self.state, _ForLinking, _ForCallers, NoPythonBackend)
-
-
-def _resolved_once(resolve: Any) -> Any:
-    """Return Numba's search for an operator's code that looks up what was found for the same argument types before."""
-
-    def look_up(self: Any, context: Any, args: Any, kws: Any) -> Any:
-        key = args, tuple(kws.items())
-        found = vars(self).setdefault("found", {})
-        if key not in found:
-            found[key] = resolve(self, context, args, kws)
-        return found[key]
-
-    return look_up
-
-
-cast(Any, Function).get_call_type = _resolved_once(Function.get_call_type)
 
 
 def ignore_constants(dispatcher: Any) -> Any:

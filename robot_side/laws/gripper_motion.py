@@ -15,6 +15,7 @@ _NOISE_M_S: Final = 0.015
 _FINGERS_S: Final = 0.06
 """Time over which the fingers' speed is measured"""
 _PERIOD_S: Final = 0.008
+"""Period of this measurement: looks are made no more often"""
 STILL_M_S: Final = 0.002
 _STILL_RAD_S: Final = 0.01
 """Speed and angular speed up to which the gripper counts as at rest; objects count so up to STILL_M_S"""

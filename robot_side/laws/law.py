@@ -53,10 +53,12 @@ def require_usable(situation: Situation, joints: int, now_s: float) -> None:
     arrays = pose.tool_position_m, pose.tool_rotation, pose.tool_jacobian, pose.sphere_centers_m, pose.sphere_radii_m
     # A sum of squares is finite only if all numbers are; this takes a third of the time that np.isfinite takes.
     squares = sum(float(np.vdot(array, array)) for array in (*arrays, rates))
-    if math.isfinite(squares + sum(situation.lateral) + situation.loop_age_s + now_s):
+    gap_m = situation.gap_m or 0.0
+    if math.isfinite(squares + sum(situation.lateral) + situation.loop_age_s + gap_m + now_s):
         return
     for name in ("tool_position_m", "tool_rotation", "tool_jacobian", "sphere_centers_m", "sphere_radii_m"):
         require_finite(f"pose.{name}", getattr(pose, name))
     require_finite("joint_velocities_rad_s", rates)
-    for name, values in (("loop_age_s", situation.loop_age_s), ("lateral", situation.lateral), ("now_s", now_s)):
+    others = ("loop_age_s", situation.loop_age_s), ("lateral", situation.lateral), ("gap_m", gap_m), ("now_s", now_s)
+    for name, values in others:
         require_finite(name, np.atleast_1d(np.array(values)))

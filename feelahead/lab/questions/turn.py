@@ -46,7 +46,7 @@ _RUNS: Final[dict[State, tuple[str | None, str]]] = {
 }
 """Frozen scene of each state, None for the built-in one, and how the person drives in it (`timed_hands`)"""
 _START_S: Final = 600.0
-_ARMED_S: Final = 60.0
+_ARMED_S: Final = 600.0
 _END_S: Final = 120.0
 """Time in seconds after which a side that does not end is killed: the machine may be busy"""
 _SETTLING_S: Final = 4.0

@@ -84,6 +84,14 @@ def test_a_stick_that_is_swapped_is_looked_along_at_once(watched: Watched) -> No
     assert watched.ticks(0.004, 3, lateral=(-1.0, 0.0)) == [3, 0, 0]
 
 
+def test_objects_without_velocities_are_looked_at_in_each_new_frame_and_resting_ones_are_not(watched: Watched) -> None:
+    watched.ticks(0.008, 3)
+    for velocities, looks in ((None, 2), (np.zeros((1, 3)), 0)):
+        for _ in range(3):
+            watched.objects = replace(walls(0.1), velocities_m_s=velocities)
+            assert watched.ticks(0.008, 1) == [looks]
+
+
 def test_a_clock_that_goes_back_stops_no_looks(watched: Watched) -> None:
     watched.ticks(0.004, 3)
     watched.now_s -= 10.0
@@ -144,6 +152,7 @@ def test_a_gripper_of_more_spheres_that_is_refused_leaves_the_fingers_at_rest() 
     [
         ({"joint_velocities_rad_s": np.zeros(7)}, "joint_velocities_rad_s = 7; valid: 6"),
         ({"lateral": (np.nan, 0.0)}, "lateral"),
+        ({"gap_m": np.nan}, "gap_m"),
         ({"pose": replace(ball_pose(), sphere_centers_m=np.zeros((4, 3)))}, "pose.sphere_centers_m = 4; valid: 1"),
         ({"pose": replace(ball_pose(), tool_jacobian=np.zeros((6, 5)))}, "columns = 5; valid: 6"),
     ],

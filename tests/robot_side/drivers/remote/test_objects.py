@@ -69,6 +69,14 @@ def test_each_kind_is_where_it_is_said_to_be() -> None:
     assert Surroundings().target(frame) == 0
 
 
+def test_without_any_velocity_the_objects_velocities_are_unknown_and_not_zero() -> None:
+    sender, moving = Sender(), {"name": "ball", "sphere": 0.02, "velocity_m_s": [0.0, 0.1, 0.0]}
+    assert sender.says(CUP).velocities_m_s is None
+    found = sender.says(CUP, moving).velocities_m_s
+    assert found is not None
+    np.testing.assert_array_equal(found, [[0.0, 0.0, 0.0], [0.0, 0.1, 0.0]])
+
+
 def test_a_mean_error_is_taken_off_and_a_spread_beyond_the_laws_is_told() -> None:
     sender = Sender()
     frame = sender.says(CUP | {"mean_m": [0.01, 0.0, 0.0], "sd_m": 0.005})
