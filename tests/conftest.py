@@ -1,5 +1,6 @@
 """Rules for every test: no test fails because the machine is slow, and only marked tests may start a process."""
 
+import os
 import sys
 from collections.abc import Iterator
 from typing import Any
@@ -33,6 +34,15 @@ sys.addaudithook(refuse_processes)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Let the longest tests begin first, so that no worker is left alone with one of them in the end."""
     items.sort(key=lambda item: not any(map(item.get_closest_marker, ("processes", "install", "long"))))
+
+
+def pytest_runtest_logreport(report: pytest.TestReport) -> None:
+    """Print a failure when it happens: a run that is ended from outside never comes to its summary."""
+    if report.failed and "PYTEST_XDIST_WORKER" not in os.environ:
+        crash = getattr(report.longrepr, "reprcrash", None)
+        why = report.longreprtext.strip().splitlines()[-1] if crash is None else crash.message
+        sys.stdout.write(f"\n{report.nodeid} ({report.when}): {why}\n")
+        sys.stdout.flush()
 
 
 @pytest.hookimpl(wrapper=True)

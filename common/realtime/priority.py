@@ -27,12 +27,7 @@ def raise_priority() -> bool:
     for thread in _threads():
         with contextlib.suppress(OSError):
             os.setpriority(os.PRIO_PROCESS, thread, _NICENESS)
-    # Where there is an autogroup, a thread's niceness counts only within its session.
-    with contextlib.suppress(OSError):
-        before = int(_SESSION.read_text(encoding="ascii").split()[-1])
-        if before > _NICENESS:  # not raised by the other side, which restores it
-            _SESSION.write_text(str(_NICENESS), encoding="ascii")
-            atexit.register(_restore_session, before)
+    _raise_session()
     return os.getpriority(os.PRIO_PROCESS, 0) <= _NICENESS
 
 
@@ -79,6 +74,16 @@ def _may_lock_without_limit() -> bool:
         if line.startswith("CapEff:"):
             return bool(int(line.split()[1], 16) >> _CAP_IPC_LOCK & 1)
     return False
+
+
+def _raise_session() -> None:
+    """Raise the session where there is one: then a thread's niceness counts only within it."""
+    with contextlib.suppress(OSError):
+        group = _SESSION.read_text(encoding="ascii").split()
+        # Empty: this process began before the first session. High: the other side raised it, and restores it.
+        if group and (before := int(group[-1])) > _NICENESS:
+            _SESSION.write_text(str(_NICENESS), encoding="ascii")
+            atexit.register(_restore_session, before)
 
 
 def _restore_session(niceness: int) -> None:

@@ -41,6 +41,17 @@ def test_the_session_has_its_old_priority_afterwards() -> None:
     assert said[0] == said[1]
 
 
+def test_a_process_from_before_the_first_session_has_none_to_raise(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    of_none = tmp_path / "autogroup"
+    of_none.touch()
+    monkeypatch.setattr(priority, "_SESSION", of_none)
+    monkeypatch.setattr(os, "setpriority", lambda *_: None)
+    priority.raise_priority()
+    assert of_none.read_text() == ""
+
+
 @pytest.mark.processes
 def test_realtime_is_granted_or_a_note_names_the_command_that_permits_it() -> None:
     said = run(

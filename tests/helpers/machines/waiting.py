@@ -6,9 +6,12 @@ from typing import TypeVar
 
 LIMIT_S = 600.0
 """Time limit in seconds that a machine of a tenth of the speed keeps, whose processor is taken away for seconds"""
+AFTER_A_FAILURE_S = 60.0
+"""Limit once a wait has failed: a cause that breaks many tests must not take this time of each"""
 Value = TypeVar("Value")
 
 _LOOK_S = 0.02
+_failures: list[str] = []
 
 
 def wait_until(
@@ -21,12 +24,14 @@ def wait_until(
 
     After `limit_s`, raise AssertionError: it names the event `what`, and the state that `instead` returns.
     """
+    limit_s = min(limit_s, AFTER_A_FAILURE_S) if _failures else limit_s
     end_s = time.monotonic() + limit_s
     while time.monotonic() < end_s:
         value = condition()
         if value is not None and value is not False:
             return value
         time.sleep(_LOOK_S)
+    _failures.append(what)
     raise AssertionError(f"not within {limit_s:g} s: {what}" + ("" if instead is None else f"; instead: {instead()}"))
 
 
