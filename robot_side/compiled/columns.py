@@ -4,7 +4,6 @@ The arrays are declared once for Python and kernels. Passing one argument costs 
 """
 
 import ctypes
-import functools
 import math
 from collections.abc import Callable
 from typing import Any, Final, Generic, NamedTuple, TypeVar, cast
@@ -15,7 +14,7 @@ import numpy as np
 
 from common.arrays import IntArray
 from robot_side.compiled.kernel import as_in_kernels, intrinsic
-from robot_side.compiled.numba_inside import array_at, element_of
+from robot_side.compiled.numba_inside import array_at, elements_of
 
 _Columns = TypeVar("_Columns", bound=tuple[Any, ...])
 
@@ -98,13 +97,11 @@ def _view(columns: Any, forms: tuple[Form, ...]) -> Any:
         tuple_type = cast(Any, numba.types.BaseTuple).from_types(arrays, columns)
 
         def generate(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+            elements = elements_of(context, builder, bundle, arguments[0], 2 * len(forms))
             values = []
-            for place, (array, form) in enumerate(zip(arrays, forms, strict=True)):
-                read = functools.partial(element_of, context, builder, bundle, arguments[0], place)
-                address, length = read(0), read(1)
+            for array, form, address, length in zip(arrays, forms, elements[::2], elements[1::2], strict=True):
                 pointer = builder.inttoptr(address, context.get_value_type(numba.types.voidptr))
-                shape = [length, *(length.type(size) for size in form.inner)]
-                values.append(array_at(context, builder, array, pointer, shape))
+                values.append(array_at(context, builder, array, pointer, length, form.inner))
             return context.make_tuple(builder, tuple_type, values)
 
         return tuple_type(BUNDLE), generate

@@ -5,12 +5,14 @@ with an empty cache, and check that cold compilation takes no longer.
 """
 
 import contextlib
+import math
 import pickle
 import sys
 from typing import Any, Final, cast
 
 import llvmlite
 import numba
+from llvmlite import ir
 from numba.core.caching import _Cache
 from numba.core.cgutils import alloca_once
 from numba.core.codegen import JITCodeLibrary
@@ -27,7 +29,7 @@ from numba.core.typed_passes import (
 )
 from numba.core.types import BooleanLiteral, IntegerLiteral
 from numba.core.untyped_passes import FixupArgs, GenericRewrites, IRProcessing, ReconstructSSA, TranslateByteCode
-from numba.np.arrayobj import get_itemsize, make_array, populate_array
+from numba.np.arrayobj import get_itemsize, make_array
 
 from robot_side.compiled.machine_code import keep, kept, machine_code_folder
 
@@ -201,25 +203,29 @@ def call_at(context: Any, builder: Any, signature: Any, address: Any, given: lis
     return result
 
 
-def array_at(context: Any, builder: Any, array_type: Any, pointer: Any, shape: list[Any]) -> Any:
+def array_at(context: Any, builder: Any, array_type: Any, pointer: Any, count: Any, inner: tuple[int, ...]) -> Any:
     """Emit LLVM code that makes a C-contiguous array of this type around the memory at a pointer, and return the array.
 
-    shape: 64-bit integers. The memory is not owned, so it is never freed.
+    The shape is (count, *inner); `count` is a 64-bit integer. The memory is not owned, so it is never freed.
     """
-    array = make_array(array_type)(context, builder)  # type: ignore[no-untyped-call]
-    itemsize = shape[0].type(get_itemsize(context, array_type))  # type: ignore[no-untyped-call]
-    strides = [itemsize]
-    for size in reversed(shape[1:]):
-        strides.insert(0, builder.mul(size, strides[0]))
+    integer, itemsize = count.type, get_itemsize(context, array_type)  # type: ignore[no-untyped-call]
     data = builder.bitcast(pointer, context.get_data_type(array_type.dtype).as_pointer())
-    populate_array(array, data, shape, strides, itemsize, meminfo=None)  # type: ignore[no-untyped-call]
-    return array._getvalue()
+    items = builder.mul(count, integer(math.prod(inner))) if inner else count
+    # Numba's fields: the memory's owner, its parent, number of items, bytes of an item, data, shape, strides.
+    array = ir.Constant(context.get_value_type(array_type), None)
+    for place, value in enumerate((items, integer(itemsize), data), start=2):
+        array = builder.insert_value(array, value, place)
+    for axis, size in enumerate((count, *map(integer, inner))):
+        array = builder.insert_value(array, size, (5, axis))
+        array = builder.insert_value(array, integer(itemsize * math.prod(inner[axis:])), (6, axis))
+    return array
 
 
-def element_of(context: Any, builder: Any, table_type: Any, table: Any, row: int, column: int) -> Any:
-    """Emit LLVM code that reads one element of a C-contiguous table of two columns; return the element's value."""
-    array = make_array(table_type)(context, builder, table)  # type: ignore[no-untyped-call]
-    return builder.load(builder.gep(array.data, [array.itemsize.type(2 * row + column)]))
+def elements_of(context: Any, builder: Any, table_type: Any, table: Any, count: int) -> list[Any]:
+    """Emit LLVM code that reads the first `count` elements of a C-contiguous table; return the elements' values."""
+    data = make_array(table_type)(context, builder, table).data  # type: ignore[no-untyped-call]
+    index = ir.IntType(64)
+    return [builder.load(builder.gep(data, [index(place)])) for place in range(count)]
 
 
 def room_on_stack(context: Any, builder: Any, element: Any, count: int) -> Any:

@@ -26,8 +26,8 @@ def on_stack(*shape: int, dtype: Any = np.float64) -> Callable[[], np.ndarray]:
 
         def generate(context: Any, builder: Any, _signature: Any, _arguments: Any) -> Any:
             room = room_on_stack(context, builder, array_type.dtype, math.prod(shape))
-            integer = context.get_value_type(INT64)
-            return array_at(context, builder, array_type, room, [integer(size) for size in shape])
+            count = context.get_value_type(INT64)(shape[0])
+            return array_at(context, builder, array_type, room, count, shape[1:])
 
         return array_type(), generate
 

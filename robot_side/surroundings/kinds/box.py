@@ -4,9 +4,8 @@ import math
 from typing import Final
 
 from common.arrays import FloatArray, IntArray
-from robot_side.compiled.kernel import FLOAT64, building_block, compiled, inlined, power_of_two_below
+from robot_side.compiled.kernel import FLOAT64, building_block, compiled, inlined
 from robot_side.compiled.vectors import Vector, add, dot, norm, scale, subtract
-from robot_side.overlap.solids.box_lane import box_lane
 from robot_side.surroundings.kinds.kind import Array, Check, Kind, Placed
 from robot_side.surroundings.kinds.layout import (
     CLOSING,
@@ -108,34 +107,64 @@ def contact(shapes: FloatArray, row: int, start: Vector, radius: float, along: V
 
 
 @building_block
-def _beyond_edge(a: float, b: float) -> tuple[float, float, float]:
-    """Return the volume of the unit ball's part with x >= a, y >= b, and areas of its flat sides at x = a and y = b.
+def _beyond_edge(a: float, b: float) -> float:
+    """Return the volume of the unit ball's part with x >= a and y >= b.
 
-    V = (S - a A - b B) / 3. The area S of the spherical side follows from its boundary's curvature (Gauss and Bonnet).
+    V = (S - a A - b B) / 3 with the areas A, B of the flat sides. The area S of the spherical side follows from its
+    boundary's curvature (Gauss and Bonnet).
     """
     if a * a + b * b >= 1.0 and a > 0.0 and b > 0.0:
-        return 0.0, 0.0, 0.0
+        return 0.0
     a, b = max(a, -1.0), max(b, -1.0)
-    disc_a, disc_b = math.sqrt(1.0 - a * a), math.sqrt(1.0 - b * b)
     inside = math.sqrt(max(1.0 - a * a - b * b, 0.0))
-    turn_a, turn_b = _arc_cosine(b, disc_a), _arc_cosine(a, disc_b)
-    area_a, area_b = disc_a * disc_a * turn_a - b * inside, disc_b * disc_b * turn_b - a * inside
-    surface = 2.0 * (math.pi - a * turn_a - b * turn_b - _arc_cosine(-a * b, disc_a * disc_b))
-    return max(surface - a * area_a - b * area_b, 0.0) / 3.0, area_a, area_b
+    turn_a, turn_b = math.atan2(inside, b), math.atan2(inside, a)
+    surface = 2.0 * (math.pi - a * turn_a - b * turn_b - math.atan2(inside, -a * b))
+    return max(surface - a * _segment(1.0 - a * a, b) - b * _segment(1.0 - b * b, a), 0.0) / 3.0
 
 
-@inlined
-def _arc_cosine(near: float, far: float) -> float:
-    """Return the angle whose cosine is near / far; 0 for a ratio above 1, π for a ratio below -1."""
-    if abs(near) >= far:
-        return 0.0 if near > 0.0 else math.pi
-    return math.acos(near / far)
+@building_block
+def _segment(square: float, a: float) -> float:
+    """Return the area of a disc's part with x >= a; square: of the disc's radius."""
+    height = math.sqrt(max(square - a * a, 0.0))
+    return square * math.atan2(height, a) - a * height
 
 
-@inlined
-def _reaches_corner(a: float, b: float, c: float) -> bool:
-    """Return whether a part of the unit ball is beyond three faces at once; a, b, c: their heights over its centre."""
-    return max(a, 0.0) ** 2 + max(b, 0.0) ** 2 + max(c, 0.0) ** 2 < 1.0
+@building_block
+def _beyond_lines(square: float, a: float, b: float) -> tuple[float, float]:
+    """Return the area of a disc's part with x >= a and y >= b, and its arc's angle; square: of the disc's radius.
+
+    The angle is right only if the lines cross in the disc.
+    """
+    if a * a + b * b < square:
+        width, height = math.sqrt(square - b * b), math.sqrt(square - a * a)
+        turn = math.atan2(height, a) - math.atan2(b, width)
+        return 0.5 * (square * turn - a * (height - b) - b * (width - a)), turn
+    area = 0.0
+    if a < 0.0:
+        area = _segment(square, b)
+        return (area - _segment(square, -a) if b < 0.0 else area), 0.0
+    return (_segment(square, a) if b < 0.0 else area), 0.0
+
+
+@building_block
+def _beyond_corner(a: float, b: float, c: float) -> float:
+    """Return the volume of the unit ball's part with x >= a, y >= b and z >= c, as `_beyond_edge` does."""
+    rest = 1.0 - a * a - b * b - c * c
+    if rest > 0.0:
+        area_a, turn_a = _beyond_lines(1.0 - a * a, b, c)
+        area_b, turn_b = _beyond_lines(1.0 - b * b, c, a)
+        area_c, turn_c = _beyond_lines(1.0 - c * c, a, b)
+        corners = math.atan2(math.sqrt(rest + c * c), -a * b) + math.atan2(math.sqrt(rest + a * a), -b * c)
+        corners += math.atan2(math.sqrt(rest + b * b), -c * a)
+        surface = 2.0 * math.pi - corners - a * turn_a - b * turn_b - c * turn_c
+        return max(surface - a * area_a - b * area_b - c * area_c, 0.0) / 3.0
+    # The corner is outside the ball: what is beyond two faces, but for what is beyond neither the third nor its mirror.
+    beyond, sign = 0.0, 1.0
+    if a < 0.0:
+        beyond, sign, a = _beyond_edge(b, c), -1.0, -a
+    if b < 0.0:
+        beyond, sign, b = beyond + sign * _beyond_edge(a, c), -sign, -b
+    return beyond + sign * _beyond_edge(a, b) if c < 0.0 else beyond
 
 
 @compiled(*OVERLAP, returns=FLOAT64)
@@ -151,9 +180,8 @@ def overlap_one_box(
 ) -> float:
     """Return the overlap of a sphere with a box, by inclusion-exclusion over the sphere's parts beyond faces.
 
-    The parts beyond one face are subtracted, then the parts beyond two faces are added again. If a part lies beyond
-    three faces (a corner), `box_lane` computes the overlap. Lengths are in units of the radius. Faces 0 to 2 are the
-    upper faces of the three axes, 3 to 5 the lower faces.
+    The parts beyond one face are subtracted, those beyond two faces added again, those beyond three subtracted. Lengths
+    are in units of the radius. Faces 0 to 2 are the upper faces of the three axes, 3 to 5 the lower faces.
     """
     a, b, c = x - shapes[row, 0], y - shapes[row, 1], z - shapes[row, 2]
     axes = (
@@ -171,22 +199,25 @@ def overlap_one_box(
         *(part * (half[0] - u), part * (half[1] - v), part * (half[2] - w)),
         *(part * (half[0] + u), part * (half[1] + v), part * (half[2] + w)),
     )
-    volume, corner, along = 4.0 / 3.0 * math.pi, False, (0.0, 0.0, 0.0)
+    volume, along = 4.0 / 3.0 * math.pi, (0.0, 0.0, 0.0)
     for face in range(6):
         if away[face] >= 1.0:
             continue
-        height, area = max(away[face], -1.0), 0.0
-        area += math.pi * (1.0 - height * height)
+        height = max(away[face], -1.0)
+        square = 1.0 - height * height
+        area = math.pi * square
         volume -= math.pi / 3.0 * (1.0 - height) * (1.0 - height) * (2.0 + height)
         for other in range(6):
             if other % 3 == face % 3 or away[other] >= 1.0:
                 continue
-            beyond, mine, _ = _beyond_edge(away[face], away[other])
-            area -= mine
-            volume += 0.5 * beyond
+            area -= _segment(square, away[other])
+            if face < other:
+                volume += _beyond_edge(height, away[other])
             for third in range(other + 1, 6):
-                if third % 3 != face % 3 and third % 3 != other % 3:
-                    corner = corner or _reaches_corner(away[face], away[other], away[third])
+                if third % 3 != face % 3 and third % 3 != other % 3 and away[third] < 1.0:
+                    area += _beyond_lines(square, away[other], away[third])[0]
+                    if face < other:
+                        volume -= _beyond_corner(height, away[other], away[third])
         rising = area if face >= 3 else -area
         axis = face % 3
         along = (
@@ -194,16 +225,8 @@ def overlap_one_box(
             along[1] + (rising if axis == 1 else 0.0),
             along[2] + (rising if axis == 2 else 0.0),
         )
-    if not corner:
-        pushed = add(scale(along[0], axes[0]), add(scale(along[1], axes[1]), scale(along[2], axes[2])))
-        return to_metres(max(volume, 0.0), pushed, radius, radius, overlap_gradient)
-    size = power_of_two_below(radius)
-    part = 1.0 / size
-    found, _ = box_lane(
-        *((0.0, 0.0, 0.0), part * radius, (-part * a, -part * b, -part * c), axes),
-        (part * half[0], part * half[1], part * half[2]),
-    )
-    return to_metres(found[0], found[1], size, radius, overlap_gradient)
+    pushed = add(scale(along[0], axes[0]), add(scale(along[1], axes[1]), scale(along[2], axes[2])))
+    return to_metres(max(volume, 0.0), pushed, radius, radius, overlap_gradient)
 
 
 KIND: Final = Kind(

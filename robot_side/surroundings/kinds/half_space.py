@@ -8,7 +8,7 @@ import numpy as np
 from common.arrays import FloatArray
 from robot_side.compiled.kernel import inlined
 from robot_side.compiled.vectors import Vector, dot, negative
-from robot_side.overlap.solids.half_space import half_space_overlap
+from robot_side.overlap.solids.half_space import cap
 from robot_side.overlap.solids.solid import Overlap
 from robot_side.surroundings.kinds.kind import Array, Check, Kind, Placed
 from robot_side.surroundings.kinds.layout import (
@@ -56,8 +56,10 @@ def contact(shapes: FloatArray, row: int, start: Vector, radius: float, along: V
 
 @inlined
 def overlap(shapes: FloatArray, row: int, center: Vector, radius: float) -> Overlap:
-    """Return the exact overlap of a sphere with the half-space in `row` (eq. 12)."""
-    return half_space_overlap(center, radius, (shapes[row, 0], shapes[row, 1], shapes[row, 2]), shapes[row, 3])
+    """Return the overlap of a sphere with the half-space in `row` (eq. 12)."""
+    normal = shapes[row, 0], shapes[row, 1], shapes[row, 2]
+    height = dot(normal, center) - shapes[row, 3]
+    return cap(radius - height, radius + height, radius, normal)
 
 
 KIND: Final = Kind(

@@ -5,9 +5,8 @@ from typing import Final
 
 from common.arrays import FloatArray
 from robot_side.compiled.kernel import inlined
-from robot_side.compiled.vectors import Vector, dot, norm, subtract, unit
-from robot_side.overlap.solids.ball import sphere_overlap
-from robot_side.overlap.solids.solid import Overlap
+from robot_side.compiled.vectors import Vector, dot, norm, scale, subtract, unit
+from robot_side.overlap.solids.solid import Overlap, nothing, sphere_volume, whole_solid, whole_sphere
 from robot_side.surroundings.kinds.kind import Array, Check, Kind, Placed
 from robot_side.surroundings.kinds.layout import (
     ANY_DIRECTION,
@@ -57,8 +56,22 @@ def contact(shapes: FloatArray, row: int, start: Vector, radius: float, along: V
 
 @inlined
 def overlap(shapes: FloatArray, row: int, center: Vector, radius: float) -> Overlap:
-    """Return the exact overlap of a sphere with the sphere in `row` (eq. 11)."""
-    return sphere_overlap(center, radius, (shapes[row, 0], shapes[row, 1], shapes[row, 2]), shapes[row, 3])
+    """Return the overlap of a sphere with the sphere in `row`, a lens (eq. 11): the sum of two caps."""
+    offset = subtract((shapes[row, 0], shapes[row, 1], shapes[row, 2]), center)
+    distance, other = norm(offset), shapes[row, 3]
+    depth = radius + other - distance
+    if depth <= 0.0:
+        return nothing()
+    if distance <= abs(radius - other):
+        return whole_sphere(radius) if radius <= other else whole_solid(sphere_volume(other))
+    # Heights of the caps of both spheres
+    mine, theirs = (
+        0.5 * depth * (distance + other - radius) / distance,
+        0.5 * depth * (distance + radius - other) / distance,
+    )
+    volume = math.pi / 3.0 * (mine * mine * (3.0 * radius - mine) + theirs * theirs * (3.0 * other - theirs))
+    disc = math.pi * mine * (2.0 * radius - mine)
+    return volume, scale(disc / distance, offset), 2.0 * math.pi * radius * mine
 
 
 KIND: Final = Kind(
