@@ -51,14 +51,22 @@ class _ForCallers(LoweringPass):
         return True
 
 
-class _ForLinking(JITCodeLibrary):
+class _Optimised(JITCodeLibrary):
+    """Library whose code is optimised once, at the end. Numba's usual library does so three times."""
+
+    def _optimize_functions(self, ll_module: Any) -> None:
+        ll_module.data_layout = self._codegen._data_layout
+
+    def _optimize_final_module(self) -> None:
+        passes, builder = cast(Any, self._codegen)._module_pass_manager()
+        passes.run(self._final_module, builder)
+
+
+class _ForLinking(_Optimised):
     """Library of one function's code as it was written, which is only linked into kernels.
 
     Numba's usual library links and optimises a function again with each function that calls it.
     """
-
-    def _optimize_functions(self, ll_module: Any) -> None:
-        ll_module.data_layout = self._codegen._data_layout
 
     def finalize(self) -> None:
         """Do nothing but note the addresses that the code contains: the kernel links and optimises it."""
@@ -66,7 +74,7 @@ class _ForLinking(JITCodeLibrary):
         self._finalized = True
 
 
-class _Kernel(JITCodeLibrary):
+class _Kernel(_Optimised):
     """Library of a kernel, into which each function that it uses is linked once. All are optimised together."""
 
     def finalize(self) -> None:
@@ -105,6 +113,7 @@ class ForPython(CompilerBase):
 
     def define_pipelines(self) -> list[Any]:
         """Return the pipeline, which ends with machine code."""
+        self.state.flags.no_cfunc_wrapper = True
         return _pipeline(self.state, _Kernel, NoPythonBackend)
 
 
