@@ -7,7 +7,7 @@ from robot_side.compiled.kernel import Compiled, imported_kernels
 NAMES = (
     "robot_side.drivers.mujoco.plant.sense",
     "robot_side.arm.resolved_rate._resolve",
-    "robot_side.field.total_overlap._sum_overlaps",
+    "robot_side.surroundings.kinds.box.overlap_one_box",
 )
 
 
