@@ -26,7 +26,6 @@ from robot_side.overlap.lanes import (
     column,
     doubt,
     load_rows,
-    load_vectors,
     reach,
     store_result,
     vector_column,
@@ -55,11 +54,11 @@ def _load(
     count: int,
     block: FloatArray,
 ) -> None:
-    load_vectors(centers.reshape(-1), first, count, block, _CENTER)
+    load_rows(centers.reshape(-1), first, count, 3, block, _CENTER)
     load_rows(radii, first, count, 1, block, _RADIUS)
-    load_vectors(boxes[0].reshape(-1), first, count, block, _BOX_CENTER)
+    load_rows(boxes[0].reshape(-1), first, count, 3, block, _BOX_CENTER)
     load_rows(boxes[1].reshape(-1), first, count, 9, block, _ROTATION)
-    load_vectors(boxes[2].reshape(-1), first, count, block, _HALF_SIZES)
+    load_rows(boxes[2].reshape(-1), first, count, 3, block, _HALF_SIZES)
 
 
 @inlined

@@ -8,7 +8,6 @@ import numpy as np
 
 from common.arrays import FloatArray, IntArray
 from robot_side.compiled.kernel import inlined
-from robot_side.compiled.transpose import transpose_four, transpose_three
 from robot_side.compiled.vectors import Vector
 from robot_side.overlap.solids.solid import Overlap
 
@@ -84,30 +83,9 @@ def load_rows(rows: FloatArray, first: int, count: int, width: int, lanes: Float
 
     Rows have `width` numbers, for as many columns from `index` on.
     """
-    if count == LANES:
-        # The number of lanes is known at compile time: vector instructions.
-        for lane in range(0, LANES, 4):
-            for part in range(width // 4):
-                start, end = (first + lane) * width + 4 * part, (index + 4 * part) * LANES + lane
-                second, third, fourth = start + width, start + 2 * width, start + 3 * width
-                transpose_four(rows, start, second, third, fourth, lanes, end, LANES)
-        for number in range(width // 4 * 4, width):
-            for lane in range(LANES):
-                lanes[np.uint64((index + number) * LANES + lane)] = rows[np.uint64((first + lane) * width + number)]
-    else:
-        for lane in range(count):
-            for number in range(width):
-                lanes[np.uint64((index + number) * LANES + lane)] = rows[np.uint64((first + lane) * width + number)]
-
-
-@inlined
-def load_vectors(rows: FloatArray, first: int, count: int, lanes: FloatArray, index: int) -> None:
-    """Do the same as `load_rows` for rows of three numbers."""
-    if count == LANES:
-        for lane in range(0, LANES, 4):
-            transpose_three(rows, 3 * (first + lane), lanes, index * LANES + lane, LANES)
-    else:
-        load_rows(rows, first, count, 3, lanes, index)
+    for lane in range(count):
+        for number in range(width):
+            lanes[np.uint64((index + number) * LANES + lane)] = rows[np.uint64((first + lane) * width + number)]
 
 
 @inlined

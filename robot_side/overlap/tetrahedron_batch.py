@@ -28,7 +28,6 @@ from robot_side.overlap.lanes import (
     column,
     doubt,
     load_rows,
-    load_vectors,
     reach,
     store_result,
     vector_column,
@@ -52,7 +51,7 @@ cover it. It is relative to the sixth power of the longest length, as the produc
 def _load(
     centers: FloatArray, radii: FloatArray, tetrahedra: tuple[FloatArray], first: int, count: int, block: FloatArray
 ) -> None:
-    load_vectors(centers.reshape(-1), first, count, block, _CENTER)
+    load_rows(centers.reshape(-1), first, count, 3, block, _CENTER)
     load_rows(radii, first, count, 1, block, _RADIUS)
     load_rows(tetrahedra[0].reshape(-1), first, count, 12, block, _CORNERS)
 

@@ -3,9 +3,10 @@
 import math
 from typing import NamedTuple
 
+import numpy as np
+
 from common.arrays import FloatArray, IntArray
 from robot_side.compiled.kernel import building_block, inlined
-from robot_side.compiled.transpose import transpose_four
 from robot_side.compiled.vectors import Vector, add, dot, scale
 from robot_side.overlap.digits.double_double import ZERO, divided, plus
 from robot_side.overlap.digits.double_double_vectors import PreciseVector, highs, precise_add, precise_scale
@@ -221,13 +222,10 @@ def _lows(vector: PreciseVector) -> Vector:
 def _load_lanes(tables: MeshTables, near: IntArray, first: int, size: int, groups: int, scratch: FloatArray) -> None:
     triangles, last = tables.triangles.reshape(-1), first + size - 1
     # Loops take whole groups, so that they have no remainder; copies of the last triangle fill the last group.
-    for lane in range(0, groups * WIDTH, 4):
-        place = first + lane
-        row_0, row_1 = FIELDS * near[min(place, last)], FIELDS * near[min(place + 1, last)]
-        row_2, row_3 = FIELDS * near[min(place + 2, last)], FIELDS * near[min(place + 3, last)]
-        for field in range(0, FIELDS, 4):
-            end = CORNERS + field * ROW + lane
-            transpose_four(triangles, row_0 + field, row_1 + field, row_2 + field, row_3 + field, scratch, end, ROW)
+    for lane in range(groups * WIDTH):
+        row = FIELDS * near[min(first + lane, last)]
+        for field in range(FIELDS):
+            scratch[np.uint64(CORNERS + field * ROW + lane)] = triangles[np.uint64(row + field)]
 
 
 @building_block
