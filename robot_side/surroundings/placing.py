@@ -6,20 +6,26 @@ import numpy as np
 
 from common.arrays import FloatArray, IntArray
 from robot_side.surroundings.bounds import around
-from robot_side.surroundings.kinds.kind import Placed
+from robot_side.surroundings.kinds.kind import Kind, Placed
 from robot_side.surroundings.kinds.layout import SHAPE_NUMBERS
 from robot_side.surroundings.perceived import KINDS, PerceivedObjects
 
+Grouped = tuple[tuple[Kind, IntArray], ...]
+"""Kinds of some primitives, each with the indices of its primitives"""
 
-def placed_rows(numbers: FloatArray, kinds: IntArray) -> Placed:
-    """Return shapes, bounds and volumes of primitives with these numbers (n, 20) and kinds (n,)."""
-    count = len(kinds)
+
+def grouped(kinds: IntArray) -> Grouped:
+    """Return the kinds of primitives with these numbers of kinds (n,)."""
+    found = [(kind, np.flatnonzero(kinds == number)) for number, kind in enumerate(KINDS)]
+    return tuple(entry for entry in found if len(entry[1]))
+
+
+def placed_rows(numbers: FloatArray, groups: Grouped) -> Placed:
+    """Return shapes, bounds and volumes of primitives with these numbers (n, 20)."""
+    count = len(numbers)
     rows = Placed(np.empty((count, SHAPE_NUMBERS)), np.empty((count, 4)), np.empty(count))
-    for number, kind in enumerate(KINDS):
-        mine = np.flatnonzero(kinds == number)
-        if len(mine):
-            for column, values in zip(rows, kind.place(numbers[mine]), strict=True):
-                column[mine] = values
+    for kind, mine in groups:
+        rows.shapes[mine], rows.bounds[mine], rows.volumes_m3[mine] = kind.place(numbers[mine])
     return rows
 
 

@@ -11,9 +11,9 @@ from robot_side.surroundings.blocks import Blocks
 from robot_side.surroundings.kinds.kind import Placed
 from robot_side.surroundings.kinds.layout import MESH, VELOCITY
 from robot_side.surroundings.perceived import KINDS, PerceivedObjects, SomeObjects
-from robot_side.surroundings.placing import numbers_of, of_objects, placed_rows, primitives_of
+from robot_side.surroundings.placing import grouped, numbers_of, of_objects, placed_rows, primitives_of
 from robot_side.surroundings.scene_columns import SCENE
-from robot_side.surroundings.validity import are_possible, require_valid
+from robot_side.surroundings.validity import NumberChecks, require_valid
 
 if TYPE_CHECKING:
     from robot_side.surroundings.placed_meshes import PlacedMeshes
@@ -26,7 +26,8 @@ class MoverRows:
         self.movers = movers
         self.rows = np.flatnonzero(np.isin(table.object_index, movers.things))
         """(n,) rows of the movers' primitives"""
-        self.kinds = table.kinds[self.rows]
+        kinds = table.kinds[self.rows]
+        self.groups, self.checks = grouped(kinds), NumberChecks(kinds)
         places = table.blocks.places(movers.things)
         self.bounded = np.flatnonzero(places >= 0)
         """Movers that have bounds"""
@@ -138,9 +139,9 @@ def _write_movers(table: SceneTable, moving: MoverRows, numbers: FloatArray) -> 
     movers, count = moving.movers, len(moving.rows)
     own = numbers[:count]
     velocities_m_s = numbers[count:, VELOCITY : VELOCITY + 3]
-    if not are_possible(own, moving.kinds) or (movers.measured and not np.isfinite(velocities_m_s).all()):
+    if not moving.checks.valid(own) or (movers.measured and not np.isfinite(velocities_m_s).all()):
         return False
-    placed = placed_rows(own, moving.kinds)
+    placed = placed_rows(own, moving.groups)
     if not (placed.volumes_m3 > 0.0).all():
         return False
     bounds, volumes = of_objects(placed, movers.first_rows)
@@ -158,7 +159,7 @@ def _write_movers(table: SceneTable, moving: MoverRows, numbers: FloatArray) -> 
 def make(objects: PerceivedObjects) -> SceneTable:
     """Return the table of a valid frame: primitives grouped by object, without primitives that have no volume."""
     owners, kinds, rows_of_kind = primitives_of(objects)
-    placed = placed_rows(numbers_of(objects), kinds)
+    placed = placed_rows(numbers_of(objects), grouped(kinds))
     order = np.argsort(owners, kind="stable")
     order = order[placed.volumes_m3[order] > 0.0]
     first_rows = np.searchsorted(owners[order], np.arange(len(objects.names) + 1))

@@ -22,20 +22,23 @@ def center_m(table: SceneTable, thing: int) -> FloatArray:
 
     A mesh's centre is that of its bounding box in its own frame.
     """
-    mine = slice(*table.first_rows[thing : thing + 2])
-    center: FloatArray = _centers(table.shapes[mine], table.kinds[mine], np.zeros_like(table.kinds[mine]), 1)[0]
+    rows = slice(*table.first_rows[thing : thing + 2].tolist())
+    kinds = table.kinds[rows]
+    center: FloatArray = _centers(table.shapes[rows], kinds, np.zeros_like(kinds), 1)[0]
     return center
 
 
 def _centers(shapes: FloatArray, kinds: IntArray, owners: IntArray, count: int) -> FloatArray:
     """Return the centres (count, 3) of objects; owners (n,): each primitive's object."""
-    points, four = shapes[:, :3].copy(), kinds == TETRAHEDRON
-    points[four] = shapes[four, :12].reshape(-1, 4, 3).mean(axis=1)
+    points, four = shapes[:, :3], kinds == TETRAHEDRON
+    if four.any():
+        points = points.copy()
+        points[four] = shapes[four, :12].reshape(-1, 4, 3).mean(axis=1)
     ends = kinds != HALF_SPACE
-    numbers = np.bincount(owners[ends], minlength=count)
-    sums = np.stack([np.bincount(owners[ends], points[ends, axis], count) for axis in range(3)], axis=1)
+    owners, points = owners[ends], points[ends]
+    sums = np.stack([np.bincount(owners, points[:, axis], count) for axis in range(3)], axis=1)
     with np.errstate(invalid="ignore"):
-        centers: FloatArray = sums / numbers[:, None]
+        centers: FloatArray = sums / np.bincount(owners, minlength=count)[:, None]
     return centers
 
 

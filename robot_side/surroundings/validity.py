@@ -104,10 +104,18 @@ def _fault(values: FloatArray, check: Check) -> str | None:
     return None
 
 
-def are_possible(numbers: FloatArray, kinds: IntArray) -> bool:
-    """Return whether the numbers (n, 20) are valid for primitives of these kinds (n,)."""
-    for (first, last, check), of_kinds in _OF_NUMBERS.items():
-        values = numbers[of_kinds[kinds], first:last]
-        if len(values) and _fault(values, check) is not None:
-            return False
-    return bool(np.isfinite(numbers).all())
+class NumberChecks:
+    """Checks of the numbers of some primitives, whose kinds stay the same."""
+
+    def __init__(self, kinds: IntArray) -> None:
+        """kinds (n,): numbers of the primitives' kinds."""
+        self._parts = [
+            (rows, slice(first, last), check)
+            for (first, last, check), of_kinds in _OF_NUMBERS.items()
+            if len(rows := np.flatnonzero(of_kinds[kinds]))
+        ]
+
+    def valid(self, numbers: FloatArray) -> bool:
+        """Return whether the numbers (n, 20) are valid."""
+        faults = (_fault(numbers[rows, part], check) for rows, part, check in self._parts)
+        return bool(np.isfinite(numbers).all()) and all(fault is None for fault in faults)

@@ -14,6 +14,7 @@ from robot_side.drivers.mujoco.model_enums import GeomKind
 from robot_side.surroundings.kinds.layout import MESH, NUMBERS, rows
 from robot_side.surroundings.kinds.mesh import of_library
 from robot_side.surroundings.perceived import KINDS, PerceivedObjects
+from robot_side.surroundings.placing import grouped
 
 if TYPE_CHECKING:
     from robot_side.drivers.mujoco.geom_meshes import GeomMesh
@@ -160,27 +161,24 @@ class _Primitives(NamedTuple):
         return _Primitives(self.kinds[places], self.geoms[places], self.owners[places], self.sizes[places])
 
 
-class MovingPrimitives(NamedTuple):
+class MovingPrimitives:
     """Primitives of some objects (m), to be placed at the poses of MuJoCo's geoms."""
 
-    primitives: _Primitives
-    things: IntArray
-    first_geoms: IntArray
-    """(m,) first geom of each object, whose frame is the object's"""
+    def __init__(self, primitives: _Primitives, things: IntArray, first_geoms: IntArray) -> None:
+        """first_geoms (m,): first geom of each object, whose frame is the object's."""
+        self._things, self._first_geoms = things, first_geoms
+        self._groups = [(kind, rows, primitives.only(rows)) for kind, rows in grouped(primitives.kinds)]
+        self._count = len(primitives.kinds)
 
     def numbers(self, offsets_m: FloatArray, geom_positions_m: FloatArray, geom_rotations: FloatArray) -> FloatArray:
         """Return the movers' numbers (n + m, 20) as in `movers`, with velocities 0; arguments as for `place`."""
-        primitives, things, first_geoms = self
         rotations = geom_rotations.reshape(-1, 3, 3)
-        positions_m = geom_positions_m[primitives.geoms] + offsets_m[primitives.owners]
-        turned = rotations[primitives.geoms]
-        numbers: FloatArray = np.zeros((len(primitives.kinds) + len(things), NUMBERS))
-        for number, kind in enumerate(KINDS):
-            mine = np.flatnonzero(primitives.kinds == number)
-            if len(mine):
-                numbers[mine] = kind.placed(primitives.sizes[mine], positions_m[mine], turned[mine])
-        poses = geom_positions_m[first_geoms] + offsets_m[things], rotations[first_geoms]
-        numbers[len(primitives.kinds) :] = rows(*poses, width=NUMBERS)
+        numbers: FloatArray = np.empty((self._count + len(self._things), NUMBERS))
+        for kind, mine, of_kind in self._groups:
+            positions_m = geom_positions_m[of_kind.geoms] + offsets_m[of_kind.owners]
+            numbers[mine] = kind.placed(of_kind.sizes, positions_m, rotations[of_kind.geoms])
+        poses = geom_positions_m[self._first_geoms] + offsets_m[self._things], rotations[self._first_geoms]
+        numbers[self._count :] = rows(*poses, width=NUMBERS)
         return numbers
 
 

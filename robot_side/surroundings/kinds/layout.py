@@ -53,10 +53,13 @@ def lengths(vectors: FloatArray) -> FloatArray:
 
 def rows(*columns: FloatArray, width: int = SHAPE_NUMBERS) -> FloatArray:
     """Return a table (k, width) with these columns (k, ...) side by side; the rest is 0."""
-    count = len(columns[0])
-    flat = [column.reshape(count, math.prod(column.shape[1:])) for column in columns]
-    used = sum(column.shape[1] for column in flat)
-    return np.concatenate([*flat, np.zeros((count, width - used))], axis=1)
+    count, end = len(columns[0]), 0
+    table: FloatArray = np.zeros((count, width))
+    for column in columns:
+        flat = column.reshape(count, math.prod(column.shape[1:]))
+        table[:, end : end + flat.shape[1]] = flat
+        end += flat.shape[1]
+    return table
 
 
 OVERLAP: Final[tuple[Any, ...]] = (
