@@ -2,8 +2,6 @@
 
 import secrets
 from collections.abc import Callable, Sequence
-from contextlib import closing
-from functools import partial
 from typing import Final
 
 from common.clock import clock_domain
@@ -12,16 +10,15 @@ from common.command.status import Status
 from common.emulation.spec import unused_clauses
 from common.loop.loop import Loop
 from common.loop.process import Process
-from common.realtime.priority import raise_descriptor_limit
 from common.recording.provenance import provenance
-from common.sockets.authentication import RobotKeys
-from common.sockets.robot import RobotSockets
+from common.sockets.door.client import Door
+from common.sockets.door.messages import DoorSettings
 from robot_side.compiled.kernel import late_kernels
 from robot_side.compiled.warm_up import kernel_digests, warm_up
 from robot_side.core.robot_parts import RobotParts
 from robot_side.core.robot_side import RobotSide
 from robot_side.drivers.mujoco.viewpoints import first_person_eye, overview_eye
-from robot_side.drivers.remote.connected_drivers import ConnectedDrivers
+from robot_side.drivers.remote.connected_drivers import ConnectedDrivers, driver_ports
 from robot_side.parts import build_parts
 from robot_side.recording.recorder import RobotEncoder, RobotRecorder
 from robot_side.settings import RobotSettings
@@ -62,19 +59,20 @@ def command(arguments: Sequence[str], adapt: Callable[[RobotParts], Adapted] = a
     adapt: takes the parts that were built; returns an experiment's parts and listeners.
     """
     settings = parse_settings(RobotSettings, "feelahead-robot", arguments)
-    keys = None if settings.keys is None else RobotKeys.load(settings.keys)
-    raise_descriptor_limit()
-    open_sockets = partial(RobotSockets, settings.bind, settings.view_bind, insecure=settings.insecure, keys=keys)
+    ports = DoorSettings(
+        settings.bind,
+        settings.view_bind,
+        driver_ports(settings.arm, settings.objects),
+        insecure=settings.insecure,
+        keys=None if settings.keys is None else str(settings.keys),
+    )
     status, loop = Status(settings.status, "robot"), Loop(settings.tick_period_s(), _REMEDY, settings.seed)
     with Process(settings, "robot", status, RobotEncoder(), loop) as process:
         epoch, recording = secrets.randbits(53), process.recording
-        # Fail at once for an occupied port; open meanwhile, so that a driver's flag with the same port is named.
-        with closing(open_sockets()):
-            drivers = ConnectedDrivers(
-                settings.arm, settings.objects, process.note, insecure=settings.insecure, keys=keys
-            )
-            process.stack.enter_context(drivers)
+        door = process.stack.enter_context(Door(ports, process.note))
+        drivers = ConnectedDrivers(door, process.note)
         parts = build_parts(settings, epoch, clock_domain(), announce=process.note, drivers=drivers)
+        door.ready()
         recorder = [] if recording is None else [RobotRecorder(recording.noted.append)]
         core_parts, others = adapt(parts)
         physics = PhysicsTime(loop.clock, settings.seed)
@@ -97,12 +95,12 @@ def command(arguments: Sequence[str], adapt: Callable[[RobotParts], Adapted] = a
         view = SceneView(model, parts.kinematics, parts.explains, parts.surroundings, *eyes)
 
         def open_side() -> RobotTurns:
-            sockets = process.stack.enter_context(open_sockets())
-            process.note(f"listening at {sockets.control_endpoint}, view at {sockets.view_endpoint}")
-            for text in keys.notes() if keys is not None else [_OPEN_TO_ALL] if settings.insecure else []:
-                process.note(text)
-            status.event("listening", control=sockets.control_endpoint, view=sockets.view_endpoint)
-            turns = RobotTurns(settings, core, view, cameras, sockets, process, drivers, physics)
+            at = door.listen()
+            process.note(f"listening at {at.control}, view at {at.view}")
+            if settings.insecure and settings.keys is None:
+                process.note(_OPEN_TO_ALL)
+            status.event("listening", control=at.control, view=at.view)
+            turns = RobotTurns(settings, core, view, cameras, door, process, drivers, physics)
             process.stack.enter_context(late_kernels(turns.note_late))
             return turns
 

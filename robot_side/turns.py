@@ -8,8 +8,7 @@ from msgspec.structs import replace
 
 from common.loop.process import Process
 from common.protocol.view_messages import VIEW_NAMES
-from common.sockets.admission import Admission
-from common.sockets.robot import RobotSockets
+from common.sockets.door.client import Door
 from common.status.statuses import RobotStatus
 from robot_side.core.robot_side import RobotSide
 from robot_side.drivers.remote.connected_drivers import ConnectedDrivers
@@ -21,8 +20,6 @@ from robot_side.viewing.pictures import Cameras
 from robot_side.viewing.scene_view import SceneView
 from robot_side.viewing.view_scheduler import ViewScheduler
 
-KEYS_PERIOD_S: Final = 0.2
-"""Period of reading the list of allowed keys, in seconds: a revoked operator is disconnected within a second."""
 _LATE: Final = (
     "{} is compiled only now, which may stop the arm for seconds: a defect of this program, please report this line"
 )
@@ -37,25 +34,23 @@ class RobotTurns:
         core: RobotSide,
         view: SceneView,
         cameras: Cameras | None,
-        sockets: RobotSockets,
+        door: Door,
         process: Process,
         drivers: ConnectedDrivers,
         physics: PhysicsTime,
     ) -> None:
         """cameras: None if no pictures are made."""
-        self._process, self._core, self._sockets, self._drivers = process, core, sockets, drivers
+        self._process, self._core, self._door, self._drivers = process, core, door, drivers
         core.parts.arm.give_way(process.loop.clock)
         self._times = TickTimes(process.loop, core.parts.arm, physics, process.note, settings.seed)
-        self._admission = Admission()
-        self._sending = Sending(settings.link_spec(), sockets, secrets.randbits(32))
+        self._sending = Sending(settings.link_spec(), door, secrets.randbits(32))
         always = () if process.recording is None else (*VIEW_NAMES, "scene")
         self._looking = ViewScheduler(core.session, view, cameras, self._sending, always=always, seed=settings.seed)
         self._reporter = LinkReporter(
-            core.session, self._sending.budget, lambda: self._looking.pictures, sockets.tcp_figures
+            core.session, self._sending.budget, lambda: self._looking.pictures, door.tcp_figures
         )
-        self._next_keys_s = process.loop.clock.now()
         self._compiled_late = 0
-        self.wait, self.receive, self.next_due = sockets.wait, sockets.receive, self._sending.next_due
+        self.wait, self.receive, self.next_due = door.wait, door.receive, self._sending.next_due
         self.note = process.note
 
     def note_late(self, kernel: str) -> None:
@@ -69,9 +64,10 @@ class RobotTurns:
         return self._core.session.safety.state != "armed"
 
     def handle(self, received: Sequence[tuple[bytes, bytes]], now_s: float) -> None:
-        """Give the payloads that are admitted to the core."""
-        for peer, payload in self._admission.admitted(received, self._core.session.owner_peer, now_s):
+        """Give the payloads to the core."""
+        for peer, payload in received:
             self._core.receive(peer, payload, now_s)
+        self._door.own(self._core.session.owner_peer)
 
     def turn(self, now_s: float) -> None:
         """Run one tick and queue its messages."""
@@ -101,11 +97,6 @@ class RobotTurns:
         self._sending.push(self._reporter.due(now_s), now_s)
         if process.status.due(now_s):
             process.status.show(now_s, robot=replace(self._status(now_s), **self._times.paced()))
-        if now_s >= self._next_keys_s:
-            self._next_keys_s = now_s + KEYS_PERIOD_S
-            self._sockets.refresh_keys()
-            for text in self._sockets.news():
-                process.note(text)
         tuning, episodes = self._core.session.tuning, self._core.session.episodes
         for text in (*tuning.take_notes(), *episodes.take_notes()):
             process.note(text)
@@ -116,12 +107,12 @@ class RobotTurns:
         return replace(self._core.status(now_s), **self._reporter.status())
 
     def close(self) -> None:
-        """End the companion process that renders pictures."""
+        """End the companion processes: the one that renders pictures, and the door."""
         self._looking.close()
+        self._door.close()
 
     def summary(self) -> dict[str, Any]:
         """Return the figures of the core and of the process."""
-        sockets = self._sockets
         figures = {
             **self._process.loop.pacer.summary(),
             "link": self._sending.summary(),
@@ -129,13 +120,7 @@ class RobotTurns:
             "drivers": self._drivers.summary(),
             "looked_at": self._looking.summary(),
             "compiled_late": self._compiled_late,
-            "strangers": {
-                "refused": sockets.refused,
-                "revoked": sockets.revoked,
-                "flooding": sockets.flooding,
-                "crowded": sockets.crowded,
-                "malformed": sockets.rejected,
-                "unread": self._admission.unread,
-            },
+            "strangers": self._door.counts(),
+            "door": {"restarts": self._door.restarts, "dropped": self._door.dropped},
         }
         return self._times.summary() | figures | self._core.summary()

@@ -49,6 +49,11 @@ class Companion:
         """Whether the companion has not ended yet."""
         return self._process.poll() is None
 
+    @property
+    def code(self) -> int:
+        """Exit code of the ended process; minus the signal's number if a signal ended it, 0 while it runs."""
+        return self._process.poll() or 0
+
     def __enter__(self) -> Self:
         return self
 

@@ -13,6 +13,8 @@ class AllowList:
     folder: KeyFolder
     names: dict[str, str] = field(default_factory=dict)
     """Names of the admitted peers, keyed by their public keys."""
+    barred: frozenset[str] = frozenset()
+    """Keys that are not let in at present, although they are allowed"""
     unreadable: str | None = None
     """Reason why the folder cannot be read at present; None while it can."""
     faults: tuple[str, ...] = ()

@@ -131,10 +131,11 @@ class Authenticator:
         request = question[1] if len(question) > 1 else b""
         is_curve = len(question) == 7 and question[5] == b"CURVE" and question[2] == _ZAP_DOMAIN
         key = question[6].hex() if is_curve else ""
-        if key in self._allowed.names:
+        if key in self._allowed.names and key not in self._allowed.barred:
             return [b"1.0", request, b"200", b"", key.encode(), b""]
         self.refused += 1
-        if is_curve and key not in self._refused_keys and len(self._refused_keys) < _REMEMBERED_REFUSALS:
+        is_new = key not in self._refused_keys and key not in self._allowed.names
+        if is_curve and is_new and len(self._refused_keys) < _REMEMBERED_REFUSALS:
             self._refused_keys[key] = True
         return [b"1.0", request, b"400", b"not allowed", b"", b""]
 

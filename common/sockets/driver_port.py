@@ -1,16 +1,25 @@
 """Socket of the robot side to which a user's program connects: an arm's driver, or a perception of objects."""
 
+from collections import Counter
 from typing import Final, NamedTuple
 
 import zmq
 
 from common.sockets.authentication import Authenticator, RobotKeys
-from common.sockets.endpoints import parse_bind, refuse_open
+from common.sockets.descriptors import shut_down
+from common.sockets.endpoints import parse_driver
+from common.sockets.gate import Gate, Gates
 from common.sockets.inbox import Inbox
-from common.sockets.readable import user_of
+from common.sockets.readable import descriptor_of, user_of
 from common.sockets.round_robin import Offered
-from common.sockets.shell import SocketShell, bind_socket
+from common.sockets.shell import CONTROL_UNSENT_BYTES, SocketShell, bind_socket
+from common.sockets.tcp_figures import peer_address
 
+BYTES_PER_S: Final = 64e6
+"""Budget of a connection's bytes, if the caller has none: a perception's largest frames at 60 Hz"""
+PEER_LIMIT_PER_S: Final = 5000
+"""Maximum number of messages a second from one key, or without keys from one peer, as at the control port"""
+MOST_CONNECTIONS: Final = 64
 _HEARTBEAT_S: Final = 1.0
 _HANDSHAKE_S: Final = 5.0
 
@@ -30,19 +39,29 @@ class DriverPort(SocketShell):
     """
 
     def __init__(
-        self, bind: str, flag: str, limit_bytes: int, *, insecure: bool = False, keys: RobotKeys | None = None
+        self,
+        bind: str,
+        flag: str,
+        limit_bytes: int,
+        *,
+        insecure: bool = False,
+        keys: RobotKeys | None = None,
+        bytes_per_s: float = BYTES_PER_S,
     ) -> None:
         """Bind to the address `bind`, the value of `flag`. `limit_bytes`: largest valid message, at least 1 KiB.
+        `bytes_per_s`: budget of each connection.
 
         Raises ConfigurationError if the address is malformed, in use, or not this machine's. Also if it is open to the
         network with neither `keys` nor `insecure`.
         """
-        endpoint = parse_bind(bind, flag)
-        if keys is None and not insecure:
-            refuse_open(endpoint, bind, flag)
-        self.revoked = 0
-        """Number of messages from peers whose keys were revoked after their handshake"""
+        endpoint = parse_driver(bind, flag, guarded=insecure or keys is not None)
+        self.revoked = self.flooding = self.crowded = 0
+        """Numbers of messages from peers whose keys were revoked after their handshake, of messages above
+        PEER_LIMIT_PER_S, and of connections that were ended because of MOST_CONNECTIONS"""
         self._keys = keys
+        self._counted: Counter[bytes | str] = Counter()
+        self._second = 0
+        self._flooding: set[str] = set()
         super().__init__(_HEARTBEAT_S, _HANDSHAKE_S)
         try:
             self._authenticator = None if keys is None else Authenticator(self._context, keys.allowed)
@@ -53,6 +72,8 @@ class DriverPort(SocketShell):
             self._part.setsockopt(zmq.ROUTER_HANDOVER, 1)
             if keys is not None:
                 keys.secure(self._part)
+            held = MOST_CONNECTIONS, _HANDSHAKE_S, CONTROL_UNSENT_BYTES
+            self._ports = Gates([Gate(self._context, self._part, *held, bytes_per_s)])
             bind_socket(self._part, endpoint, flag)
             self._inbox = Inbox(self._part, frames=2)
             self.endpoint = self._part.getsockopt_string(zmq.LAST_ENDPOINT)
@@ -65,11 +86,16 @@ class DriverPort(SocketShell):
         """Return the messages that have arrived, oldest first; never waits."""
         if self._authenticator is not None:
             self._authenticator.serve()
+        now_s = self._clock.now()
+        if (second := int(now_s)) != self._second:
+            self._second = second
+            self._counted.clear()
+        self.crowded += self._ports.update(now_s)
         received = []
         for name, *frames in self._inbox.read():
-            if self._keys is not None and user_of(frames[-1] if frames else name) not in self._keys.allowed.names:
-                self.revoked += 1
-            elif len(frames) == 1:
+            if not self._admits(name.bytes, frames[-1] if frames else name):
+                continue
+            if len(frames) == 1:
                 received.append(Received(name.bytes, frames[0].bytes, self._clock.now()))
             else:
                 self.rejected += 1
@@ -96,3 +122,33 @@ class DriverPort(SocketShell):
         """Wait for a message, at most `timeout_s`; return the time on our monotonic clock."""
         self.wait_for(timeout_s, [self._inbox], self._authenticator)
         return self._clock.now()
+
+    def cut_off(self, now_s: float) -> tuple[int, str]:
+        """End connections beyond their budget of bytes; return the heaviest one's bytes since the last call, and its
+        address."""
+        self.crowded += self._ports.update(now_s)
+        size, descriptor = self._ports.cut_off(now_s)
+        return size, peer_address(descriptor)
+
+    def take_flooding(self) -> set[str]:
+        """Return the keys that were cut off because of PEER_LIMIT_PER_S since the last call."""
+        flooding, self._flooding = self._flooding, set()
+        return flooding
+
+    def _admits(self, name: bytes, frame: zmq.Frame) -> bool:
+        """Return whether a message's key is allowed and sends no more than it may; otherwise end the connection."""
+        key = "" if self._keys is None else user_of(frame)
+        descriptor = descriptor_of(frame)
+        self._counted[key or name] += 1
+        revoked = self._keys is not None and key not in self._keys.allowed.names
+        if not revoked and self._counted[key or name] <= PEER_LIMIT_PER_S:
+            self._ports.gates[0].connections.introduced(descriptor)
+            return True
+        self.revoked += revoked
+        self.flooding += not revoked
+        if key and not revoked:
+            self._flooding.add(key)
+        self.crowded += self._ports.update(self._clock.now())
+        if self._ports.all_seen and self._ports.gates[0].connections.number(descriptor):
+            shut_down(descriptor)
+        return False

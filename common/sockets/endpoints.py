@@ -93,6 +93,27 @@ def view_after(control: Endpoint, text: str, flag: str) -> Endpoint:
     return Endpoint(control.host, port, control.ipv6)
 
 
+def parse_operators(bind: str, view_bind: str | None, *, guarded: bool) -> tuple[Endpoint, Endpoint]:
+    """Parse the addresses of the control port and of the view port; None: the port after that of `bind`.
+
+    guarded: whether it may be open to the network. Raises ConfigurationError.
+    """
+    control = parse_bind(bind, "--bind")
+    view = view_after(control, bind, "--view-bind") if view_bind is None else parse_bind(view_bind, "--view-bind")
+    if not guarded:
+        refuse_open(control, bind, "--bind")
+        refuse_open(view, view_bind or bind, "--view-bind")
+    return control, view
+
+
+def parse_driver(bind: str, flag: str, *, guarded: bool) -> Endpoint:
+    """Parse the address of a port for a user's program, as `parse_operators` does."""
+    endpoint = parse_bind(bind, flag)
+    if not guarded:
+        refuse_open(endpoint, bind, flag)
+    return endpoint
+
+
 def refuse_open(endpoint: Endpoint, text: str, flag: str) -> None:
     """Raise ConfigurationError, which names remedies, if other machines could reach `endpoint`."""
     if not endpoint.is_loopback():

@@ -73,6 +73,10 @@ class Peers:
         connection.peer.round_robin.connections.append(connection)
         return connection
 
+    def key_at(self, descriptor: int) -> str:
+        """Return the key of the peer whose messages come by the TCP connection `descriptor`; empty if unknown."""
+        return next((each.peer.key for each in self.connections.values() if each.descriptor == descriptor), "")
+
     def count(self, peer: Peer) -> int:
         """Count a message of `peer`; return how many its key has sent this second, or without keys the peer."""
         account = peer.key or peer.name

@@ -35,6 +35,10 @@ class PortConnections:
         """Return the number of the descriptor's connection, counted from 1 in order of arrival; 0 for none."""
         return self._numbers.get(descriptor, 0)
 
+    def numbers(self) -> dict[int, int]:
+        """Return the numbers of the present connections, keyed by descriptor."""
+        return dict(self._numbers)
+
     def ended(self, descriptor: int) -> None:
         """Remove an ended connection; its descriptor may be used again."""
         self._newcomers.pop(descriptor, None)

@@ -1,18 +1,17 @@
 """Sockets of the robot side, which distinguish peers and cut off those that flood or whose key was revoked."""
 
 import contextlib
-import select
 
 import zmq
 
 from common.errors import ConfigurationError
 from common.sockets.authentication import Authenticator, RobotKeys
 from common.sockets.descriptors import shut_down
-from common.sockets.endpoints import Endpoint, parse_bind, refuse_open, view_after
-from common.sockets.gate import Gate
+from common.sockets.endpoints import Endpoint, parse_bind, parse_operators
+from common.sockets.gate import Gate, Gates
 from common.sockets.inbox import Inbox
 from common.sockets.peers import Connection, Peers
-from common.sockets.readable import EVENTS, descriptor_of, user_of
+from common.sockets.readable import descriptor_of, user_of
 from common.sockets.round_robin import Offered
 from common.sockets.shell import (
     CONTROL_LIMIT_BYTES,
@@ -23,7 +22,8 @@ from common.sockets.shell import (
     bind_socket,
     check_size,
 )
-from common.sockets.tcp_figures import TcpFigures, tcp_figures
+from common.sockets.tcp_figures import TcpFigures, peer_address, tcp_figures
+from common.sockets.traffic import CONTROL_BYTES_PER_S, VIEW_BYTES_PER_S
 
 PEER_LIMIT_PER_S = 5000
 """Maximum number of messages a second from one key, or without keys from one peer; above it that key or peer is cut
@@ -33,8 +33,6 @@ HANDSHAKE_LIMIT_S = 5.0
 MOST_CONNECTIONS = 1024
 """Maximum number of connections to each port, unless a quarter of the descriptors that this process may open is
 less."""
-_EVENTS_PER_CALL = 256
-"""Maximum number of events of each port per call, 5 us each, so that a storm of connections cannot block the caller."""
 
 
 class RobotSockets(SocketShell):
@@ -55,13 +53,10 @@ class RobotSockets(SocketShell):
         ConfigurationError if an address is malformed, in use, or not this machine's. Also if it is open to the network
         with neither `keys` nor `insecure`.
         """
-        control = parse_bind(bind, "--bind")
-        view = view_after(control, bind, "--view-bind") if view_bind is None else parse_bind(view_bind, "--view-bind")
-        if keys is None and not insecure:
-            refuse_open(control, bind, "--bind")
-            refuse_open(view, view_bind or bind, "--view-bind")
+        control, view = parse_operators(bind, view_bind, guarded=insecure or keys is not None)
         self.flooding = 0
         """Number of messages above PEER_LIMIT_PER_S."""
+        self._flooding: set[str] = set()
         self.revoked = 0
         """Number of messages from peers whose keys were revoked after their handshake."""
         self._keys = keys
@@ -69,10 +64,6 @@ class RobotSockets(SocketShell):
         """Number of connections that were ended because of MOST_CONNECTIONS."""
         self._reported: list[str] = []
         self._peers = Peers(self._offer)
-        self._all_seen = False
-        """Whether the gates have processed all of ZeroMQ's events, so that descriptors surely belong to their
-        connections.
-        """
         self._second = 0
         self._view_endpoint: Endpoint | None = None
         self._view_outdated = False
@@ -80,8 +71,9 @@ class RobotSockets(SocketShell):
         try:
             self._control, self._view = self._open_control(zmq.ROUTER), self._open_view(zmq.PUB)
             self._inbox = Inbox(self._control, frames=2)
-            self._gates = [self._watch(self._control, CONTROL_UNSENT_BYTES), self._watch(self._view, VIEW_UNSENT_BYTES)]
-            self._listen()
+            control_gate = self._watch(self._control, CONTROL_UNSENT_BYTES, CONTROL_BYTES_PER_S)
+            view_gate = self._watch(self._view, VIEW_UNSENT_BYTES, VIEW_BYTES_PER_S)
+            self._ports = Gates([control_gate, view_gate], [self._view])
             self._authenticator = None if keys is None else Authenticator(self._context, keys.allowed)
             self._control.setsockopt(zmq.ROUTER_MANDATORY, 1)
             # A broken connection may come back before its end is noticed here.
@@ -98,17 +90,12 @@ class RobotSockets(SocketShell):
             self.close()
             raise
 
-    @property
-    def refused(self) -> int:
-        """Number of handshakes with a key that is not allowed."""
-        return 0 if self._authenticator is None else self._authenticator.refused
-
     def news(self) -> list[str]:
         """Return lines to show that are new since the last call: refused keys, faults of keys, too many connections."""
         news: list[str] = []
         wrong = []
         if self.crowded:
-            limit = self._gates[0].connections.limit
+            limit = self._ports.gates[0].connections.limit
             wrong.append(
                 f"more than {limit} connections at once: new connections of strangers are closed, admitted peers stay"
             )
@@ -195,53 +182,39 @@ class RobotSockets(SocketShell):
         """Wait for a control message, at most `timeout_s` (None: no limit); return whether there is one."""
         return self.wait_for(timeout_s, [self._inbox], self._authenticator)
 
-    def _watch(self, part: "zmq.Socket[bytes]", unsent_bytes: int) -> Gate:
-        return Gate(self._context, part, MOST_CONNECTIONS, HANDSHAKE_LIMIT_S, unsent_bytes)
+    def cut_off(self, now_s: float) -> tuple[int, str]:
+        """End connections beyond their budget; return the heaviest one's bytes since the last call, and whose."""
+        self._watch_connections()
+        size, descriptor = self._ports.cut_off(now_s)
+        names = {} if self._keys is None else self._keys.allowed.names
+        name = names.get(self._peers.key_at(descriptor))
+        return size, f"{'' if name is None else f'{name} at '}{peer_address(descriptor)}"
 
-    def _listen(self) -> None:
-        """Register the sockets of the gates and the view for polling, which shows when connections begin or end."""
-        self._comings = select.poll()
-        for part in (self._view, *(gate.events for gate in self._gates)):
-            self._comings.register(part.fileno(), select.POLLIN)
-        self._all_seen = False
+    def take_flooding(self) -> set[str]:
+        """Return the keys that were cut off because of PEER_LIMIT_PER_S since the last call."""
+        flooding, self._flooding = self._flooding, set()
+        return flooding
+
+    def _watch(self, part: "zmq.Socket[bytes]", unsent_bytes: int, bytes_per_s: float) -> Gate:
+        return Gate(self._context, part, MOST_CONNECTIONS, HANDSHAKE_LIMIT_S, unsent_bytes, bytes_per_s)
 
     def _watch_connections(self) -> None:
-        """Process the begins and ends of connections at both ports since the last call; end those beyond the limit.
-
-        A descriptor may belong to another connection by now, even at the other port. So its owner is certain only when
-        neither gate has further events. If there are more events than one call processes, no connection is ended.
-        """
-        if self._all_seen and not self._comings.poll(0):
-            return
-        # Events of the view's connections pile up until its socket is used.
-        self._view.getsockopt(EVENTS)
-        now_s = self._clock.now()
-        self._all_seen = False
-        for _ in range(_EVENTS_PER_CALL):
-            polled = [gate.poll(now_s) for gate in self._gates]
-            if not any(polled):
-                self._all_seen = True
-                break
-        else:
-            return
-        for gate in self._gates:
-            for descriptor in gate.connections.surplus(now_s):
-                shut_down(descriptor)
-                self.crowded += 1
+        self.crowded += self._ports.update(self._clock.now())
 
     def _replace_view(self, keys: RobotKeys) -> None:
         """Make a new view socket, so that all viewers must authenticate again: PUB cannot cut off a single viewer."""
         view = self._open_view(zmq.PUB)
         try:
             keys.secure(view)
-            gate = self._watch(view, VIEW_UNSENT_BYTES)
+            gate = self._watch(view, VIEW_UNSENT_BYTES, VIEW_BYTES_PER_S)
         except zmq.ZMQError:
             view.close(linger=0)
             raise
-        self._gates[1].close()
+        control_gate, view_gate = self._ports.gates
+        view_gate.close()
         self._view.close(linger=0)
-        self._view, self._gates[1], self._view_outdated = view, gate, False
-        self._listen()
+        self._view, self._view_outdated = view, False
+        self._ports = Gates([control_gate, gate], [view])
         self._view_endpoint = parse_bind(self.view_endpoint, "--view-bind")
 
     def _bind_view_again(self) -> None:
@@ -266,12 +239,12 @@ class RobotSockets(SocketShell):
         """
         key = "" if self._keys is None else user_of(frame)
         descriptor = descriptor_of(frame)
-        connection, crowd = self._peers.connection(name, key), self._gates[0].connections
+        connection, crowd = self._peers.connection(name, key), self._ports.gates[0].connections
         if descriptor != connection.descriptor or connection.number is None:
             self._watch_connections()
             # The previous connection, whose routing id was taken over: ZeroMQ neither reads nor ends it.
             self._hang_up(connection)
-            connection.stands_for(descriptor, crowd.number(descriptor) if self._all_seen else None)
+            connection.stands_for(descriptor, crowd.number(descriptor) if self._ports.all_seen else None)
         peer, is_allowed = connection.peer, self._allows(key)
         if is_allowed:
             crowd.introduced(descriptor)
@@ -279,10 +252,12 @@ class RobotSockets(SocketShell):
         if is_allowed and not is_surplus:
             return connection
         self.flooding += is_allowed
+        if is_allowed and key:
+            self._flooding.add(key)
         self.revoked += not is_allowed
         self._watch_connections()
         number = crowd.number(descriptor)
-        if self._all_seen and number != connection.number and self._is_there(connection):
+        if self._ports.all_seen and number != connection.number and self._is_there(connection):
             connection.stands_for(descriptor, number)
         for each in peer.round_robin.connections:
             self._hang_up(each)
@@ -298,7 +273,7 @@ class RobotSockets(SocketShell):
     def _hang_up(self, connection: Connection) -> None:
         """End a connection by its descriptor, so that it does not fill our memory; ZeroMQ has no call for that."""
         # A message may be read long after its sender left: the descriptor may belong to another connection by now.
-        number, now_number = connection.number, self._gates[0].connections.number(connection.descriptor)
-        if self._all_seen and not connection.hung_up and number and number == now_number:
+        number, now_number = connection.number, self._ports.gates[0].connections.number(connection.descriptor)
+        if self._ports.all_seen and not connection.hung_up and number and number == now_number:
             connection.hung_up = True
             shut_down(connection.descriptor)

@@ -11,6 +11,7 @@ from common.clock import MonotonicClock
 from common.errors import ConfigurationError
 from common.sockets.authentication import Authenticator
 from common.sockets.endpoints import Endpoint
+from common.sockets.gate import Gates
 from common.sockets.inbox import Inbox
 from common.sockets.readable import EVENTS
 from common.sockets.round_robin import Offered
@@ -25,12 +26,12 @@ CONTROL_UNSENT_BYTES = 1024
 """Maximum number of unsent bytes of each control connection in the kernel: a few messages."""
 VIEW_UNSENT_BYTES = 16 * 1024
 RECEIVE_HIGH_WATER_MARK = 100_000
-"""Length of the control socket's receive queue, in messages: never reached by a caller that empties it once per tick.
-
-A low mark would not keep messages fresh: the kernel's buffers hold thousands more, and a caller that empties the queue
-would not reach the newest. And libzmq up to 4.3.5 aborts the process when a socket at its mark finds a heartbeat
-before the end of the connection (libzmq issues 3937, 4364 and 4767).
-"""
+"""Length of a connected control socket's receive queue, in messages: never reached by a caller that empties it each
+turn. A low mark would not keep messages fresh: the kernel's buffers hold thousands more."""
+_WITHOUT_LIMIT = 0
+"""Length of a bound socket's receive queue: peers are cut off by rate and by bytes, and the process has a limit of
+memory. libzmq up to 4.3.5 aborts the process when a socket at its mark finds a heartbeat, or the end of the connection,
+before it has room again (libzmq issues 3937, 4364 and 4767)."""
 CONTROL_LIMIT_BYTES = 4096
 """Largest control payload, in bytes; the codec decodes no larger one."""
 VIEW_LIMIT_BYTES = 4 * 1024 * 1024
@@ -51,6 +52,9 @@ class SocketShell:
         self.rejected = 0
         """Number of received messages that had a wrong number of frames."""
         self._clock = MonotonicClock()
+        self._inbox: Inbox
+        self._ports = Gates([])
+        self._authenticator: Authenticator | None = None
         # A thread each: each connection of the view resolves its host's name, and a silent name server blocks the
         # thread that asks.
         self._context: zmq.Context[zmq.Socket[bytes]] = zmq.Context(io_threads=2)
@@ -62,7 +66,7 @@ class SocketShell:
         for option, value in (
             (zmq.AFFINITY, _CONTROL_THREAD),
             (zmq.SNDHWM, CONTROL_HIGH_WATER_MARK),
-            (zmq.RCVHWM, RECEIVE_HIGH_WATER_MARK),
+            (zmq.RCVHWM, _WITHOUT_LIMIT if control_type == zmq.ROUTER else RECEIVE_HIGH_WATER_MARK),
             (zmq.MAXMSGSIZE, CONTROL_LIMIT_BYTES),
             (zmq.HEARTBEAT_IVL, self._heartbeat_ms // 3),
             (zmq.HEARTBEAT_TIMEOUT, self._heartbeat_ms),
@@ -79,8 +83,7 @@ class SocketShell:
         for option, value in (
             (zmq.AFFINITY, _VIEW_THREAD),
             (zmq.SNDHWM, VIEW_HIGH_WATER_MARK),
-            # Viewers send few subscriptions, but reaching the mark could abort the process.
-            (zmq.RCVHWM, RECEIVE_HIGH_WATER_MARK if publishes else VIEW_HIGH_WATER_MARK),
+            (zmq.RCVHWM, _WITHOUT_LIMIT if publishes else VIEW_HIGH_WATER_MARK),
             (zmq.MAXMSGSIZE, CONTROL_LIMIT_BYTES if publishes else VIEW_LIMIT_BYTES),
             # No heartbeats: a viewer may stay at its mark, and a frame can delay an answer for long.
             (zmq.TCP_KEEPALIVE, 1),
@@ -102,6 +105,26 @@ class SocketShell:
     def close(self) -> None:
         """Close at once and drop unsent messages; closing twice does no harm."""
         self._context.destroy(linger=0)
+
+    @property
+    def descriptors(self) -> list[int]:
+        """Descriptors of a bound socket to wait for, once `pending` has returned False."""
+        served = [] if self._authenticator is None else [self._authenticator.fileno()]
+        return [self._inbox.descriptor, *served, *(gate.events.fileno() for gate in self._ports.gates)]
+
+    @property
+    def refused(self) -> int:
+        """Number of handshakes with a key that is not allowed."""
+        return 0 if self._authenticator is None else self._authenticator.refused
+
+    @property
+    def heavy(self) -> int:
+        """Number of connections to a bound socket that were ended because they sent too many bytes."""
+        return self._ports.heavy
+
+    def pending(self) -> bool:
+        """Answer handshakes at a bound socket; return whether anything waits to be received."""
+        return (self._authenticator is not None and self._authenticator.serve()) or self._inbox.has_some()
 
     def wait_for(self, timeout_s: float | None, awaited: Sequence[Inbox], served: Authenticator | None = None) -> bool:
         """Wait at most `timeout_s` for a message in one of `awaited`; return whether there is one.

@@ -8,8 +8,9 @@ from pathlib import Path
 from typing import Final, NamedTuple, Self
 
 _BYTES: Final = 160
-_ROUND_TRIP, _SENT_AGAIN, _SENT = 68, 100, 156
-"""Offsets in the kernel's `struct tcp_info`: tcpi_rtt in microseconds, tcpi_total_retrans, tcpi_data_segs_out."""
+_ROUND_TRIP, _SENT_AGAIN, _RECEIVED, _SENT = 68, 100, 128, 156
+"""Offsets in the kernel's `struct tcp_info`: tcpi_rtt in microseconds, tcpi_total_retrans, tcpi_bytes_received,
+tcpi_data_segs_out."""
 
 
 class TcpFigures(NamedTuple):
@@ -44,6 +45,23 @@ def tcp_figures(descriptors: Collection[int]) -> TcpFigures:
                 sent += struct.unpack_from("I", info, _SENT)[0]
                 trips_s.append(1e-6 * struct.unpack_from("I", info, _ROUND_TRIP)[0])
     return TcpFigures(sent, again, min((trip_s for trip_s in trips_s if trip_s > 0.0), default=None))
+
+
+def received_bytes(descriptor: int) -> int:
+    """Return how many bytes a connection has received since it began; 0 if it has ended."""
+    with contextlib.suppress(OSError), _borrowed(descriptor) as connection:
+        info = connection.getsockopt(socket.IPPROTO_TCP, socket.TCP_INFO, _BYTES)
+        if len(info) == _BYTES:
+            return int(struct.unpack_from("Q", info, _RECEIVED)[0])
+    return 0
+
+
+def peer_address(descriptor: int) -> str:
+    """Return host and port of a connection's other end; empty if there is none."""
+    with contextlib.suppress(OSError, ValueError), _borrowed(descriptor) as connection:
+        host, port = connection.getpeername()[:2]
+        return f"{host}:{port}"
+    return ""
 
 
 def connected_to(port: int) -> list[int]:

@@ -95,7 +95,7 @@ def complaint(command: str) -> str:
         ("feelahead-robot --keys missing --insecure", "--insecure and --keys", "one of them"),
         ("feelahead-robot --config {toml}", "camera.sd_mm", "sd_m"),
         ("feelahead-robot --config {no_toml}", "none.toml", "TOML"),
-        ("feelahead-robot --bind tcp://127.0.0.1:{port}", "{port}", "in use"),
+        pytest.param("feelahead-robot --bind tcp://127.0.0.1:{port}", "{port}", "in use", marks=pytest.mark.processes),
         ("feelahead-operator --connect tcp://127.0.0.1:99999", "99999", "65535"),
         ("feelahead-operator --keys missing", "missing", "feelahead keys make operator --folder missing"),
         (f"feelahead-operator --robot-key {KEY}", "--robot-key is given without --keys", "both"),

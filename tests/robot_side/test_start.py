@@ -56,4 +56,4 @@ def test_a_kernel_that_is_compiled_while_it_runs_is_named_once_and_counted(tmp_p
 def test_a_port_takes_a_quarter_of_the_descriptors_that_the_process_may_open(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(resource, "getrlimit", lambda _: (256, 4096))
     with RobotSockets("tcp://127.0.0.1:*", "tcp://127.0.0.1:*") as robot:
-        assert [gate.connections.limit for gate in robot._gates] == [64, 64]
+        assert [gate.connections.limit for gate in robot._ports.gates] == [64, 64]

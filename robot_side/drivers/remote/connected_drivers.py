@@ -1,12 +1,11 @@
 """Ports of the settings --arm and --objects, and the wait for the first messages over these."""
 
 from collections.abc import Callable
-from contextlib import ExitStack
-from typing import Any, Final, Self
+from typing import Any, Final
 
 from common.roles import Role
-from common.sockets.authentication import RobotKeys
-from common.sockets.driver_port import DriverPort
+from common.sockets.door.client import Door
+from common.sockets.door.messages import DriverSettings
 from robot_side.arm.port import ArmState
 from robot_side.drivers.remote.arm import RemoteArm
 from robot_side.drivers.remote.driver_session import ArmShape
@@ -15,34 +14,27 @@ from robot_side.drivers.remote.messages import STATE_LIMIT_BYTES
 from robot_side.drivers.remote.objects import RemoteObjects
 
 _TURN_S: Final = 0.004
+_STATES_BYTES_PER_S: Final = 4e6
+_FRAMES_BYTES_PER_S: Final = 64e6
+"""Budgets of a driver's states, 1000 a second, and of a perception's largest frames, 60 a second"""
 _AWAITED: Final = {"--arm": "an arm's driver", "--objects": "a process that perceives objects"}
+
+
+def driver_ports(arm: str | None, objects: str | None) -> dict[str, DriverSettings]:
+    """Return the settings of the ports at which programs connect, keyed by flag."""
+    limits = (
+        ("--arm", arm, STATE_LIMIT_BYTES, _STATES_BYTES_PER_S),
+        ("--objects", objects, FRAME_LIMIT_BYTES, _FRAMES_BYTES_PER_S),
+    )
+    return {flag: DriverSettings(bind, most, per_s) for flag, bind, most, per_s in limits if bind is not None}
 
 
 class ConnectedDrivers:
     """Programs that connect: the arm's driver and the perception process, if the settings name a port for them."""
 
-    def __init__(
-        self,
-        arm: str | None,
-        objects: str | None,
-        note: Callable[[str], None],
-        *,
-        insecure: bool = False,
-        keys: RobotKeys | None = None,
-    ) -> None:
-        """Bind the ports at once; ConfigurationError as for DriverPort. note: called with lines that people read."""
-        self._note = note
-        with ExitStack() as opened:
-            ports = [
-                (flag, text, opened.enter_context(DriverPort(text, flag, limit, insecure=insecure, keys=keys)))
-                for flag, text, limit in (
-                    ("--arm", arm, STATE_LIMIT_BYTES),
-                    ("--objects", objects, FRAME_LIMIT_BYTES),
-                )
-                if text is not None
-            ]
-            self._ports = {flag: port for flag, _, port in ports}
-            self._open = opened.pop_all()
+    def __init__(self, door: Door, note: Callable[[str], None]) -> None:
+        """door: made with the settings of `driver_ports`. note: called with lines that people read."""
+        self._note, self._ports = note, door.ports
         self._arm: RemoteArm | None = None
         self._objects: RemoteObjects | None = None
 
@@ -75,18 +67,9 @@ class ConnectedDrivers:
                 if flag not in reported:
                     reported.add(flag)
                     self._note(f"waiting for {_AWAITED[flag]} at {self._ports[flag].endpoint}")
-                # Keys may be allowed meanwhile; the turns that refresh them have not begun.
-                for text in self._ports[flag].refresh_keys():
-                    self._note(text)
             self._ports[waiting[0]].wait(_TURN_S)
 
     def summary(self) -> dict[str, Any]:
         """Return the numbers of accepted and rejected messages of each port; None for a port that is not used."""
         arm = None if self._arm is None else self._arm.session.summary()
         return {"arm": arm, "objects": None if self._objects is None else self._objects.summary()}
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._open.close()

@@ -92,11 +92,11 @@ class Connections(RuleBasedStateMachine):
         return Offered.TAKEN if self.is_open(self.newest[name]) or payload else Offered.GONE
 
     def watch(self) -> None:
-        crowd = self.robot._gates[0].connections
+        crowd = self.robot._ports.gates[0].connections
         while self.unseen and not self.late:
             event, descriptor = self.unseen.pop(0)
             crowd.accepted(descriptor, float(self.second)) if event == "came" else crowd.ended(descriptor)
-        self.robot._all_seen = not self.unseen
+        self.robot._ports.all_seen = not self.unseen
 
     def leave(self, descriptor: int) -> None:
         del self.open[descriptor]
@@ -151,15 +151,15 @@ class Connections(RuleBasedStateMachine):
         assert received == [(line.peer, b"payload")] * admitted
         self.spoken[line.key, self.second] += count
         before, self.heard[line.name] = self.heard.get(line.name, line), line
-        line.seen |= self.robot._all_seen
+        line.seen |= self.robot._ports.all_seen
         # A peer back on the same descriptor cannot be told from a sender that left messages, until they are too many.
         line.by_another &= before is line or before.descriptor != line.descriptor
-        line.known |= self.robot._all_seen and line.by_another
+        line.known |= self.robot._ports.all_seen and line.by_another
         line.heard_s = float(self.second) if admitted else before.heard_s if before.key == line.key else 0.0
         taken_over = {each.descriptor for each in self.open.values() if each.name == line.name and each is not line}
         of_peer = {each.descriptor for each in self.open.values() if each.peer == line.peer}
         assert set(self.ended) <= taken_over | (of_peer if admitted < count else set()), "somebody else's was ended"
-        if self.robot._all_seen:
+        if self.robot._ports.all_seen:
             known = {each.descriptor for each in (*self.heard.values(), before) if each.known and self.is_open(each)}
             own = {line.descriptor} if self.is_open(line) else set()
             assert before is line or known & taken_over <= set(self.ended)

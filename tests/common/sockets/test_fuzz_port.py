@@ -7,6 +7,7 @@ import pytest
 
 from common.clock import VirtualClock
 from common.periods import TURN_S
+from common.sockets import gate
 from common.sockets import robot as robot_sockets
 from common.sockets.allow_list import AllowList
 from common.sockets.authentication import RobotKeys, make_key_pair
@@ -122,9 +123,10 @@ def come_and_go(robot: RobotSockets, endpoint: str, count: int) -> None:
 
 def test_the_new_owner_of_a_strangers_descriptor_is_not_hung_up_on(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(robot_sockets, "MOST_CONNECTIONS", 20)
-    monkeypatch.setattr(robot_sockets, "_EVENTS_PER_CALL", 10)
+    monkeypatch.setattr(gate, "_EVENTS_PER_CALL", 10)
     hung_up: list[int] = []
-    monkeypatch.setattr(robot_sockets, "shut_down", hung_up.append)
+    for module in (gate, robot_sockets):
+        monkeypatch.setattr(module, "shut_down", hung_up.append)
     with RobotSockets(EPHEMERAL, heartbeat_timeout_s=PATIENT_S) as robot:
         come_and_go(robot, robot.view_endpoint, 100)
         with OperatorSockets(robot.control_endpoint, robot.view_endpoint, heartbeat_timeout_s=PATIENT_S) as operator:
@@ -132,7 +134,7 @@ def test_the_new_owner_of_a_strangers_descriptor_is_not_hung_up_on(monkeypatch: 
             for _ in range(50):
                 robot.receive()
             assert hung_up == []
-            assert robot._all_seen
+            assert robot._ports.all_seen
 
 
 def test_the_largest_message_that_is_allowed_arrives_and_the_next_larger_does_not(robot: RobotSockets) -> None:

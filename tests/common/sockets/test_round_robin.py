@@ -187,7 +187,7 @@ def test_a_viewer_that_stops_reading_keeps_few_old_pictures_and_others_miss_noth
     publish_until_seen(robot, operator, b"telemetry")
     with closing(RawConnection.introduced(port_of(robot.view_endpoint), b"SUB", buffer_bytes=4096)) as deaf:
         deaf.send(message(b"\x01video"))
-        gate = robot._gates[1]
+        gate = robot._ports.gates[1]
         assert any(
             robot.wait(0.01) or len(gate.connections._numbers) == 2 for _ in range(ROUNDS) if not robot.receive()
         )

@@ -19,11 +19,12 @@ import operator_side.main
 import robot_side.main
 from common.loop.loop import Loop
 from common.sockets.authentication import make_key_pair
+from common.sockets.door.keeper import KEYS_S
 from common.sockets.keys import KeyFolder
 from feelahead.both_sides.processes import SideFailedError, SideProcess
 from operator_side.turns import OperatorTurns
 from robot_side.operators.safety import SafetySettings
-from robot_side.turns import KEYS_PERIOD_S, RobotTurns
+from robot_side.turns import RobotTurns
 from tests.helpers.machines.waiting import LIMIT_S
 from tests.helpers.machines.waiting import wait_until as wait_for
 from tests.helpers.python_process import ended, start
@@ -77,7 +78,8 @@ def test_the_demo_runs_both_sides_and_writes_one_summary(tmp_path: Path) -> None
         assert 0.0 <= paced["wake_error_us"]["p50"] <= paced["wake_error_us"]["p99"] <= paced["wake_error_us"]["max"]
     # Before the robot side knows its operator, a late tick reads as little from it as from anybody.
     assert summary["strangers"].pop("unread") >= 0
-    assert summary["strangers"] == {"refused": 0, "revoked": 0, "flooding": 0, "crowded": 0, "malformed": 0}
+    assert set(summary["strangers"].values()) == {0}
+    assert summary["door"] == {"restarts": 0, "dropped": 0}
     # A deadline is met by a tick or counted as an overrun (test_pacing.py: each of them), and none is both.
     assert 0 < summary["ticks"] <= summary["ticks"] + summary["overruns"] <= summary["duration_s"] * 1000 + 1
 
@@ -117,7 +119,7 @@ def test_a_side_that_is_killed_or_stands_still_disarms_and_a_signal_ends_each(tm
 
 
 def test_an_unknown_key_moves_nothing_until_it_is_allowed_and_a_revoked_one_is_thrown_out(tmp_path: Path) -> None:
-    assert KEYS_PERIOD_S <= 0.5  # Out within a second.
+    assert KEYS_S <= 0.5  # Out within a second.
     folder, theirs, path = KeyFolder(tmp_path / "robot"), KeyFolder(tmp_path / "anna"), tmp_path / "operator.json"
     (robot_key, robot_secret), (anna_key, anna_secret) = make_key_pair(), make_key_pair()
     folder.write_pair("robot", robot_key, robot_secret)

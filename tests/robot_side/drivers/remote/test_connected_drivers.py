@@ -4,13 +4,20 @@ import pytest
 
 from common.errors import ConfigurationError
 from common.roles import Role
+from common.sockets.door.client import Door
+from common.sockets.door.messages import DoorSettings
 from robot_side.core.robot_side import RobotSide
 from robot_side.drivers.mujoco.scene import Scene
-from robot_side.drivers.remote.connected_drivers import ConnectedDrivers
+from robot_side.drivers.remote.connected_drivers import ConnectedDrivers, driver_ports
 from robot_side.parts import build_parts
 from robot_side.settings import RobotSettings
 from tests.helpers.socket_talk import EPHEMERAL
 from tests.robot_side.drivers.remote.test_examples import running
+
+
+def door(arm: str | None, objects: str | None) -> Door:
+    return Door(DoorSettings(EPHEMERAL, EPHEMERAL, driver_ports(arm, objects)), print)
+
 
 SETTINGS = RobotSettings(arm=EPHEMERAL, objects=EPHEMERAL, roles={"ball": Role.SUPPORT}, seed=1)
 
@@ -18,7 +25,9 @@ SETTINGS = RobotSettings(arm=EPHEMERAL, objects=EPHEMERAL, roles={"ball": Role.S
 @pytest.mark.processes
 def test_a_robot_side_waits_for_both_and_knows_no_truth(scene: Scene) -> None:
     notes: list[str] = []
-    with ConnectedDrivers(SETTINGS.arm, SETTINGS.objects, notes.append) as drivers:
+    with door(SETTINGS.arm, SETTINGS.objects) as opened:
+        opened.ready()
+        drivers = ConnectedDrivers(opened, notes.append)
         parts = build_parts(SETTINGS, 1, "clock", scene, drivers=drivers)
         assert parts.notes[0].startswith("the driver's joints, in this order: shoulder_pan, shoulder_lift")
         arm_at, objects_at = (port.endpoint for port in drivers._ports.values())
@@ -49,10 +58,12 @@ def test_a_robot_side_waits_for_both_and_knows_no_truth(scene: Scene) -> None:
         build_parts(RobotSettings(roles={"ball": Role.SUPPORT}, scene="wall"), 1, "clock")
 
 
+@pytest.mark.processes
 def test_an_address_that_is_taken_is_refused_and_none_stays_open() -> None:
-    with ConnectedDrivers(EPHEMERAL, None, print) as first:
-        taken = first._ports["--arm"].endpoint
-        with pytest.raises(ConfigurationError, match="--objects: cannot bind"):
-            ConnectedDrivers(EPHEMERAL, taken, print)
-    with ConnectedDrivers(taken, None, print):
-        pass
+    with door(EPHEMERAL, None) as first:
+        first.ready()
+        taken = first.ports["--arm"].endpoint
+        with door(EPHEMERAL, taken) as second, pytest.raises(ConfigurationError, match="--objects: cannot bind"):
+            second.ready()
+    with door(taken, None) as third:
+        third.ready()

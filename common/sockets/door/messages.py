@@ -1,0 +1,129 @@
+"""Messages between the door and the process that ticks. Each is one message of a `Channel`."""
+
+from typing import Final
+
+import msgspec
+from msgspec import Struct
+
+from common.sockets.tcp_figures import TcpFigures
+
+ROOM_BYTES: Final = 1 << 23
+"""Bytes that wait at either end of the channel at most; messages beyond are dropped"""
+
+
+class DriverSettings(Struct, frozen=True):
+    """Port to which programs of the user connect."""
+
+    bind: str
+    limit_bytes: int
+    """Largest valid message"""
+    bytes_per_s: float
+    """Budget of each connection"""
+
+
+class DoorSettings(Struct, frozen=True):
+    """Settings of a door."""
+
+    bind: str
+    view_bind: str | None = None
+    drivers: dict[str, DriverSettings] = {}
+    """Ports of programs, keyed by flag"""
+    insecure: bool = False
+    keys: str | None = None
+    """Folder of keys; None admits everybody"""
+    listens: bool = False
+    """Whether to open the ports of operators at once, without `Listen`"""
+
+
+class FromPeer(Struct, frozen=True, array_like=True, tag=1):
+    """Control message that has arrived."""
+
+    peer: bytes
+    payload: bytes
+
+
+class FromDriver(Struct, frozen=True, array_like=True, tag=2):
+    """Message of a user's program that has arrived."""
+
+    flag: str
+    peer: bytes
+    payload: bytes
+    received_s: float
+    """Time at which it was taken from the socket, on the machine's monotonic clock"""
+
+
+class Ready(Struct, frozen=True, array_like=True, tag=3):
+    """The ports of programs are bound, and those of operators can be."""
+
+    drivers: dict[str, str]
+    """Bound addresses, keyed by flag"""
+    notes: list[str]
+
+
+class Listening(Struct, frozen=True, array_like=True, tag=4):
+    """The ports of operators are bound."""
+
+    control: str
+    view: str
+
+
+class Failed(Struct, frozen=True, array_like=True, tag=5):
+    """A setting is wrong, or a port cannot be bound; the companion ends."""
+
+    text: str
+
+
+class Figures(Struct, frozen=True, array_like=True, tag=6):
+    """What has happened at the ports since they were opened; sent ten times a second, and before the end."""
+
+    counts: dict[str, int]
+    tcp: TcpFigures
+    """Figures of the owner's connections"""
+    notes: list[str]
+    busiest: str
+    """Who sent most bytes in the last second, in words; empty if nobody sent anything"""
+
+
+class ToPeer(Struct, frozen=True, array_like=True, tag=1):
+    """Control message to send; everywhere: over each of the peer's connections."""
+
+    peer: bytes
+    payload: bytes
+    everywhere: bool
+
+
+class ToViewers(Struct, frozen=True, array_like=True, tag=2):
+    """Message for all viewers who subscribe to `topic`."""
+
+    topic: bytes
+    payload: bytes
+
+
+class ToDriver(Struct, frozen=True, array_like=True, tag=3):
+    """Message to a user's program."""
+
+    flag: str
+    peer: bytes
+    payload: bytes
+
+
+class Owner(Struct, frozen=True, array_like=True, tag=4):
+    """Peer that owns the lease: its messages are never dropped for those of others."""
+
+    peer: bytes | None
+
+
+class Listen(Struct, frozen=True, array_like=True, tag=5):
+    """Bind the ports of operators."""
+
+
+class Close(Struct, frozen=True, array_like=True, tag=6):
+    """Send the last figures, then end."""
+
+
+Said = FromPeer | FromDriver | Ready | Listening | Failed | Figures
+Asked = ToPeer | ToViewers | ToDriver | Owner | Listen | Close
+
+encode: Final = msgspec.msgpack.Encoder().encode
+decode_said: Final = msgspec.msgpack.Decoder(Said).decode
+decode_asked: Final = msgspec.msgpack.Decoder(Asked).decode
