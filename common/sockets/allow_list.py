@@ -1,9 +1,11 @@
 """Peers that a running robot side admits, read from the folder of keys."""
 
+from collections.abc import Collection
 from dataclasses import dataclass, field
 
 from common.errors import ConfigurationError
-from common.sockets.keys import SHORTAGES, KeyFolder
+from common.sockets.key_files import SHORTAGES, KeyRole
+from common.sockets.keys import KeyFolder
 
 
 @dataclass
@@ -13,6 +15,8 @@ class AllowList:
     folder: KeyFolder
     names: dict[str, str] = field(default_factory=dict)
     """Names of the admitted peers, keyed by their public keys."""
+    roles: dict[str, KeyRole] = field(default_factory=dict)
+    """Their roles, keyed likewise"""
     barred: frozenset[str] = frozenset()
     """Keys that are not let in at present, although they are allowed"""
     unreadable: str | None = None
@@ -22,12 +26,14 @@ class AllowList:
     _fingerprint: tuple[tuple[str, int, int], ...] | None = None
 
     def refresh(self) -> set[str]:
-        """Read the folder if it has changed; return the keys that were revoked. If unchanged, costs a few stat calls.
+        """Read the folder if it has changed; return the keys that were revoked, or have another role.
+
+        If it is unchanged, this costs a few stat calls.
 
         An unreadable folder admits nobody. But if it is unreadable for lack of descriptors or memory, the list stays: a
         peer that exhausts these must not get others excluded.
         """
-        before = set(self.names)
+        before = dict(self.roles)
         try:
             fingerprint = self.folder.fingerprint()
             if fingerprint == self._fingerprint:
@@ -37,7 +43,15 @@ class AllowList:
             # Without a fingerprint the next call reads again.
             self.unreadable, self._fingerprint = str(error), None
             if getattr(error, "errno", None) not in SHORTAGES:
-                self.names = {}
+                self.names, self.roles = {}, {}
         else:
-            self.names, self.faults, self.unreadable, self._fingerprint = peers.names, peers.faults, None, fingerprint
-        return before - set(self.names)
+            self.names, self.roles, self.faults, self.unreadable, self._fingerprint = (
+                *(peers.names, peers.roles, peers.faults),
+                None,
+                fingerprint,
+            )
+        return {key for key, role in before.items() if self.roles.get(key) != role}
+
+    def admits(self, key: str, roles: Collection[KeyRole]) -> bool:
+        """Return whether a key is allowed, has one of these roles, and is not barred."""
+        return self.roles.get(key) in roles and key not in self.barred

@@ -4,6 +4,7 @@ ZeroMQ asks over a separate socket whether a key is allowed (ZAP, rfc.zeromq.org
 messages answers, so that there is no other thread that could die unnoticed. Without answers no peer is admitted.
 """
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from zmq.utils.monitor import parse_monitor_message
 from common.errors import ConfigurationError
 from common.sockets.allow_list import AllowList
 from common.sockets.descriptors import hold_little
+from common.sockets.key_files import KeyRole
 from common.sockets.keys import KeyFolder, read_public_key
 from common.sockets.readable import readable
 
@@ -97,10 +99,16 @@ class OperatorKeys:
 class Authenticator:
     """Authenticator of the handshakes of one ZeroMQ context, by an allow-list. Make it before any socket is bound."""
 
-    def __init__(self, context: "zmq.Context[zmq.Socket[bytes]]", allowed: AllowList) -> None:
+    def __init__(
+        self,
+        context: "zmq.Context[zmq.Socket[bytes]]",
+        allowed: AllowList,
+        roles: Collection[KeyRole] = ("operator", "observer"),
+    ) -> None:
+        """roles: those that are let in."""
         self.refused = 0
         """Number of handshakes with a key that is not allowed."""
-        self._allowed = allowed
+        self._allowed, self._roles = allowed, roles
         self._refused_keys: dict[str, bool] = {}
         self._questions = context.socket(zmq.REP)
         self._questions.setsockopt(zmq.LINGER, 0)
@@ -123,18 +131,25 @@ class Authenticator:
         """Return a line for each unknown key newly refused since the last call, with the command that allows it."""
         new = [key for key, is_new in self._refused_keys.items() if is_new]
         self._refused_keys.update(dict.fromkeys(new, False))
-        command = self._allowed.folder.command
-        return [f"refused an unknown key; to let it in: {command(f'allow NAME {key}')}" for key in new]
+        return [self._line(key) for key in new]
+
+    def _line(self, key: str) -> str:
+        command, name = self._allowed.folder.command, self._allowed.names.get(key)
+        if name is None:
+            role = "" if "operator" in self._roles else f" --role {next(iter(self._roles))}"
+            return f"refused an unknown key; to let it in: {command(f'allow NAME {key}{role}')}"
+        had, wanted = self._allowed.roles[key], " or ".join(self._roles)
+        return f"refused {name}, whose role is {had}, where {wanted} is let in (feelahead keys allow --help)"
 
     def _answer(self, question: list[bytes]) -> list[bytes]:
         # version, request, domain, address, identity, mechanism, and for CURVE the client's public key
         request = question[1] if len(question) > 1 else b""
         is_curve = len(question) == 7 and question[5] == b"CURVE" and question[2] == _ZAP_DOMAIN
         key = question[6].hex() if is_curve else ""
-        if key in self._allowed.names and key not in self._allowed.barred:
+        if self._allowed.admits(key, self._roles):
             return [b"1.0", request, b"200", b"", key.encode(), b""]
         self.refused += 1
-        is_new = key not in self._refused_keys and key not in self._allowed.names
+        is_new = key not in self._refused_keys and key not in self._allowed.barred
         if is_curve and is_new and len(self._refused_keys) < _REMEMBERED_REFUSALS:
             self._refused_keys[key] = True
         return [b"1.0", request, b"400", b"not allowed", b"", b""]

@@ -10,6 +10,7 @@ from common.sockets.descriptors import shut_down
 from common.sockets.endpoints import parse_driver
 from common.sockets.gate import Gate, Gates
 from common.sockets.inbox import Inbox
+from common.sockets.key_files import KeyRole
 from common.sockets.readable import descriptor_of, user_of
 from common.sockets.round_robin import Offered
 from common.sockets.shell import CONTROL_UNSENT_BYTES, SocketShell, bind_socket
@@ -46,10 +47,11 @@ class DriverPort(SocketShell):
         *,
         insecure: bool = False,
         keys: RobotKeys | None = None,
+        role: KeyRole = "driver",
         bytes_per_s: float = BYTES_PER_S,
     ) -> None:
         """Bind to the address `bind`, the value of `flag`. `limit_bytes`: largest valid message, at least 1 KiB.
-        `bytes_per_s`: budget of each connection.
+        `role`: role of the keys that are let in. `bytes_per_s`: budget of each connection.
 
         Raises ConfigurationError if the address is malformed, in use, or not this machine's. Also if it is open to the
         network with neither `keys` nor `insecure`.
@@ -58,13 +60,13 @@ class DriverPort(SocketShell):
         self.revoked = self.flooding = self.crowded = 0
         """Numbers of messages from peers whose keys were revoked after their handshake, of messages above
         PEER_LIMIT_PER_S, and of connections that were ended because of MOST_CONNECTIONS"""
-        self._keys = keys
+        self._keys, self._role = keys, role
         self._counted: Counter[bytes | str] = Counter()
         self._second = 0
         self._flooding: set[str] = set()
         super().__init__(_HEARTBEAT_S, _HANDSHAKE_S)
         try:
-            self._authenticator = None if keys is None else Authenticator(self._context, keys.allowed)
+            self._authenticator = None if keys is None else Authenticator(self._context, keys.allowed, (role,))
             self._part = self._open_control(zmq.ROUTER)
             self._part.setsockopt(zmq.MAXMSGSIZE, limit_bytes)
             self._part.setsockopt(zmq.ROUTER_MANDATORY, 1)
@@ -140,7 +142,7 @@ class DriverPort(SocketShell):
         key = "" if self._keys is None else user_of(frame)
         descriptor = descriptor_of(frame)
         self._counted[key or name] += 1
-        revoked = self._keys is not None and key not in self._keys.allowed.names
+        revoked = self._keys is not None and not self._keys.allowed.admits(key, (self._role,))
         if not revoked and self._counted[key or name] <= PEER_LIMIT_PER_S:
             self._ports.gates[0].connections.introduced(descriptor)
             return True

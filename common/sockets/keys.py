@@ -2,14 +2,12 @@
 
     FOLDER/robot.secret        the robot side's secret key (mode 0600)
     FOLDER/robot.public        its public part, to be given to the operators
-    FOLDER/allowed/NAME.public the public key of an admitted peer; deleting the file revokes it
+    FOLDER/allowed/NAME.public the public key and the role of an admitted peer; deleting the file revokes it
 
 A key is 64 hexadecimal digits (32 bytes, Curve25519), which need no quotes in a shell. Lines that begin with # are
 comments.
 """
 
-import errno
-import os
 import re
 import stat
 from dataclasses import dataclass, field
@@ -17,31 +15,28 @@ from pathlib import Path
 from typing import Literal
 
 from common.errors import ConfigurationError
-from common.files.regular_file import read_regular_file
 from common.files.user_folders import configuration_folder
+from common.sockets.key_files import (
+    SHORTAGES,
+    KeyRole,
+    is_key,
+    read_key,
+    read_peer,
+    refuse_others,
+    stand,
+    write_key_file,
+)
 
 Side = Literal["robot", "operator"]
 
 PEER_LIMIT = 256
 """Maximum number of peers in one folder: far more operators than one robot has, and read in a few milliseconds."""
-_FILE_LIMIT_BYTES = 4096
-SHORTAGES = (errno.EMFILE, errno.ENFILE, errno.ENOMEM)
-"""Errors that are no fault of the file or folder: this process or the machine lacks descriptors or memory."""
-_KEY = re.compile(r"[0-9a-f]{64}")
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,31}")
 
 
 def default_folder() -> Path:
     """Return the default folder of keys."""
     return configuration_folder() / "keys"
-
-
-def checked_key(text: str, what: str) -> str:
-    """Return `text` as a key in lower case; raises ConfigurationError, which names `what`."""
-    key = text.strip().lower()
-    if _KEY.fullmatch(key) is None:
-        raise ConfigurationError(f"{what}: {text.strip()[:80]!r} is no key; valid: 64 hexadecimal digits")
-    return key
 
 
 def checked_name(name: str) -> str:
@@ -55,8 +50,8 @@ def checked_name(name: str) -> str:
 
 def read_public_key(key_or_file: str, what: str) -> str:
     """Return the public key that `key_or_file` gives by digits or by a file's path. ConfigurationError names `what`."""
-    if _KEY.fullmatch(key_or_file.strip().lower()):
-        return key_or_file.strip().lower()
+    if is_key(key := key_or_file.strip().lower()):
+        return key
     path = Path(key_or_file).expanduser()
     if path.suffix == ".secret":
         raise ConfigurationError(
@@ -66,7 +61,7 @@ def read_public_key(key_or_file: str, what: str) -> str:
         raise ConfigurationError(
             f"{what}: {key_or_file[:80]!r} is neither a key nor a file; valid: 64 hexadecimal digits, or a .public file"
         )
-    return _read_key(path, what)
+    return read_key(path, what, guarded=False)
 
 
 @dataclass(frozen=True)
@@ -75,6 +70,8 @@ class Peers:
 
     names: dict[str, str]
     """Names of the admitted peers, keyed by their public keys."""
+    roles: dict[str, KeyRole]
+    """Roles of the admitted peers, keyed likewise"""
     faults: tuple[str, ...]
     """Faults of files that cannot be used, one line each."""
 
@@ -111,11 +108,11 @@ class KeyFolder:
             )
         self._make_folder(self.path)
         whose = f"this {side} side"
-        _write(
+        write_key_file(
             path,
             f"# The secret key of {whose}: its readers can act as it. It never leaves this machine.\n{secret}\n",
         )
-        _write(
+        write_key_file(
             self.public_path(side), f"# The public key of {whose}, to be given to its peers.\n{public}\n", mode=0o644
         )
 
@@ -133,10 +130,10 @@ class KeyFolder:
                 f"--keys {self.path}: other users may read {path.name} (mode {mode:04o}); valid: mode 0600, "
                 f"set by `chmod 600 {path}`"
             )
-        return _read_key(path, "--keys")
+        return read_key(path, "--keys")
 
-    def allow(self, name: str, public: str) -> None:
-        """Admit a peer; raises ConfigurationError if the name or key is taken, or the folder is full."""
+    def allow(self, name: str, public: str, role: KeyRole = "operator") -> None:
+        """Admit a peer, or change its role. ConfigurationError if the name or key is taken, or the folder is full."""
         peers = self.allowed()
         if peers.get(public, name) != name:
             raise ConfigurationError(
@@ -153,7 +150,10 @@ class KeyFolder:
             )
         self._make_folder(self.path)
         self._make_folder(self.allowed_path)
-        _write(self.peer_path(name), f"# A peer that is let in as {name}; deleting this file revokes it.\n{public}\n")
+        write_key_file(
+            self.peer_path(name),
+            f"# A peer that is let in as {name}; deleting this file revokes it.\n{public}\n{role}\n",
+        )
 
     def revoke(self, name: str) -> None:
         """Revoke a peer; raises ConfigurationError if there is none of that name, or another name has the same key."""
@@ -161,7 +161,7 @@ class KeyFolder:
         if not path.is_file():
             names = ", ".join(sorted(self.allowed().values())) or "none, as no peer is allowed yet"
             raise ConfigurationError(f"name {name!r}: no such peer in {self.allowed_path}; valid: {names}")
-        key = _read_key(path, "allowed")
+        key, _ = read_peer(path)
         path.unlink()
         if (other := self.allowed().get(key)) is not None:
             raise ConfigurationError(
@@ -180,6 +180,7 @@ class KeyFolder:
         are short (SHORTAGES).
         """
         names: dict[str, str] = {}
+        roles: dict[str, KeyRole] = {}
         faults = []
         for path in self._allowed_files():
             try:
@@ -187,19 +188,23 @@ class KeyFolder:
                     raise ConfigurationError(
                         f"allowed: {path}: its name is no peer's name; valid: letters, digits, - and _, then .public"
                     )
-                key = _read_key(path, "allowed")
+                key, role = read_peer(path)
+                if roles.get(key, role) != role:
+                    raise ConfigurationError(
+                        f"allowed: {path}: its key is {roles[key]}'s by another name; valid: one role for each key"
+                    )
             except ConfigurationError as error:
                 faults.append(str(error))
             else:
-                names[key] = f"{names[key]}, {path.stem}" if key in names else path.stem
-        return Peers(names, tuple(faults))
+                names[key], roles[key] = f"{names[key]}, {path.stem}" if key in names else path.stem, role
+        return Peers(names, roles, tuple(faults))
 
     def fingerprint(self) -> tuple[tuple[str, int, int], ...]:
         """Return a value that changes when the admitted peers change, without reading the files.
 
         It has each file's name, time of change and inode. Errors as in `peers`.
         """
-        return tuple((path.name, *_stand(path)) for path in self._allowed_files())
+        return tuple((path.name, *stand(path)) for path in self._allowed_files())
 
     def command(self, rest: str) -> str:
         """Return the command line `feelahead keys REST` for this folder."""
@@ -223,7 +228,7 @@ class KeyFolder:
                 f"{self.allowed_path}: cannot be read: {error.strerror}; valid: a folder that belongs to this user,"
                 " with mode 0700"
             ) from error
-        _refuse_writable(self.allowed_path)
+        refuse_others(self.allowed_path)
         files = [path for path in paths if path.suffix == ".public" and not path.name.startswith(".")]
         if len(files) > PEER_LIMIT:
             raise ConfigurationError(
@@ -239,55 +244,3 @@ class KeyFolder:
             raise ConfigurationError(
                 f"--folder {path}: cannot be made: {error.strerror}; valid: a folder that this user may make"
             ) from error
-
-
-def _read_key(path: Path, what: str) -> str:
-    try:
-        content = read_regular_file(path, _FILE_LIMIT_BYTES).decode("ascii")
-    except UnicodeDecodeError as error:
-        raise ConfigurationError(
-            f"{what}: {path} cannot be read: it is no ASCII text; valid: a .public file"
-        ) from error
-    except OSError as error:
-        if error.errno in SHORTAGES:
-            raise
-        raise ConfigurationError(
-            f"{what}: {path} cannot be read: {error.strerror}; valid: a key file that this user may read"
-        ) from error
-    except ValueError as error:
-        raise ConfigurationError(f"{what}: {path} {error}") from error
-    lines = [line for line in content.splitlines() if line.strip() and not line.startswith("#")]
-    if len(lines) != 1:
-        raise ConfigurationError(f"{what}: {path} holds {len(lines)} lines; valid: one key of 64 hexadecimal digits")
-    return checked_key(lines[0], f"{what}: {path}")
-
-
-def _stand(path: Path) -> tuple[int, int]:
-    """Return a file's time of change and inode; for an unreadable one, -1 and the error's number."""
-    try:
-        found = path.stat()
-    except OSError as error:
-        return -1, error.errno or 0
-    return found.st_ctime_ns, found.st_ino
-
-
-def _refuse_writable(path: Path) -> None:
-    mode = stat.S_IMODE(path.stat().st_mode)
-    if mode & 0o022:
-        raise ConfigurationError(
-            f"{path}: other users may write there (mode {mode:04o}) and so let anyone in; valid: mode 0700, "
-            f"set by `chmod 700 {path}`"
-        )
-
-
-def _write(path: Path, content: str, mode: int = 0o600) -> None:
-    """Write the file atomically, so that a running side never reads half a key."""
-    partial = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
-        descriptor = os.open(partial, os.O_WRONLY | os.O_CREAT | os.O_EXCL, mode)
-        with os.fdopen(descriptor, "w", encoding="ascii") as file:
-            file.write(content)
-        partial.replace(path)
-    except OSError as error:
-        partial.unlink(missing_ok=True)
-        raise ConfigurationError(f"{path}: cannot be written: {error.strerror}") from error

@@ -42,11 +42,16 @@ class Peer:
 class Peers:
     """Peers and their connections; does no I/O."""
 
-    def __init__(self, offer: Callable[[Connection, bytes], Offered]) -> None:
-        """`offer` sends a payload over a connection without waiting; after GONE the connection is forgotten."""
+    def __init__(
+        self, offer: Callable[[Connection, bytes], Offered], observes: Callable[[str], bool] = lambda _: False
+    ) -> None:
+        """`offer` sends a payload over a connection without waiting; after GONE the connection is forgotten.
+
+        `observes` tells whether a key may only observe.
+        """
         self.connections: dict[bytes, Connection] = {}
         """Connections, keyed by routing id; beyond the limit the one that has been silent longest is forgotten."""
-        self._offer = offer
+        self._offer, self._observes = offer, observes
         self._peers: dict[bytes, Peer] = {}
         self._received: Counter[bytes | str] = Counter()
 
@@ -62,7 +67,7 @@ class Peers:
         known = self.connections.get(name)
         if known is not None and known.peer.key == key:
             return known
-        connection = Connection(name, self._peer(peer_name_of(name, key), key))
+        connection = Connection(name, self._peer(peer_name(key, group_of(name), observes=self._observes(key)), key))
         if known is not None:
             connection.stands_for(known.descriptor, known.number)
             self._forget(known)
@@ -101,8 +106,3 @@ class Peers:
         connection.peer.round_robin.forget(connection)
         if not connection.peer.round_robin.connections:
             del self._peers[connection.peer.name]
-
-
-def peer_name_of(name: bytes, key: str) -> bytes:
-    """Return the name of the peer to which the routing id `name` belongs."""
-    return peer_name(key, group_of(name))

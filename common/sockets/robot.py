@@ -1,6 +1,7 @@
 """Sockets of the robot side, which distinguish peers and cut off those that flood or whose key was revoked."""
 
 import contextlib
+from typing import Final
 
 import zmq
 
@@ -10,6 +11,7 @@ from common.sockets.descriptors import shut_down
 from common.sockets.endpoints import Endpoint, parse_bind, parse_operators
 from common.sockets.gate import Gate, Gates
 from common.sockets.inbox import Inbox
+from common.sockets.key_files import KeyRole
 from common.sockets.peers import Connection, Peers
 from common.sockets.readable import descriptor_of, user_of
 from common.sockets.round_robin import Offered
@@ -28,6 +30,7 @@ from common.sockets.traffic import CONTROL_BYTES_PER_S, VIEW_BYTES_PER_S
 PEER_LIMIT_PER_S = 5000
 """Maximum number of messages a second from one key, or without keys from one peer; above it that key or peer is cut
 off. It is 20 times an operator's rate, and twice what arrives at once after ten seconds of a blocked link."""
+_ROLES: Final[tuple[KeyRole, ...]] = ("operator", "observer")
 HANDSHAKE_LIMIT_S = 5.0
 """Time limit of a handshake, in seconds: CURVE takes the server two round trips, of at most 2 s each in a session."""
 MOST_CONNECTIONS = 1024
@@ -63,7 +66,7 @@ class RobotSockets(SocketShell):
         self.crowded = 0
         """Number of connections that were ended because of MOST_CONNECTIONS."""
         self._reported: list[str] = []
-        self._peers = Peers(self._offer)
+        self._peers = Peers(self._offer, self._observes)
         self._second = 0
         self._view_endpoint: Endpoint | None = None
         self._view_outdated = False
@@ -74,7 +77,7 @@ class RobotSockets(SocketShell):
             control_gate = self._watch(self._control, CONTROL_UNSENT_BYTES, CONTROL_BYTES_PER_S)
             view_gate = self._watch(self._view, VIEW_UNSENT_BYTES, VIEW_BYTES_PER_S)
             self._ports = Gates([control_gate, view_gate], [self._view])
-            self._authenticator = None if keys is None else Authenticator(self._context, keys.allowed)
+            self._authenticator = None if keys is None else Authenticator(self._context, keys.allowed, _ROLES)
             self._control.setsockopt(zmq.ROUTER_MANDATORY, 1)
             # A broken connection may come back before its end is noticed here.
             self._control.setsockopt(zmq.ROUTER_HANDOVER, 1)
@@ -225,7 +228,10 @@ class RobotSockets(SocketShell):
                 self._view_endpoint = None
 
     def _allows(self, key: str) -> bool:
-        return self._keys is None or key in self._keys.allowed.names
+        return self._keys is None or self._keys.allowed.admits(key, _ROLES)
+
+    def _observes(self, key: str) -> bool:
+        return self._keys is not None and self._keys.allowed.roles.get(key) == "observer"
 
     def _offer(self, connection: Connection, payload: bytes) -> Offered:
         self._inbox.used()

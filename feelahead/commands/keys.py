@@ -8,6 +8,7 @@ from typing import NoReturn, get_args
 
 from common.errors import ConfigurationError
 from common.sockets.authentication import make_key_pair, public_part
+from common.sockets.key_files import KEY_ROLES
 from common.sockets.keys import KeyFolder, Side, checked_name, default_folder, read_public_key
 
 _STEPS = """\
@@ -41,8 +42,8 @@ def keys(arguments: Sequence[str]) -> int:
             said = [public_part(folder.secret(parsed.side))]
         case "allow":
             name, key = checked_name(parsed.name), read_public_key(parsed.key, "key")
-            folder.allow(name, key)
-            said = [f"{name} is let in; to end that: {folder.command(f'revoke {name}')}"]
+            folder.allow(name, key, parsed.role)
+            said = [f"{name} is let in as {parsed.role}; to end that: {folder.command(f'revoke {name}')}"]
         case "revoke":
             folder.revoke(parsed.name)
             said = [f"{parsed.name} is revoked; a running robot side cuts the connection within a second"]
@@ -74,6 +75,13 @@ def _parser() -> argparse.ArgumentParser:
     allow = actions.add_parser("allow", parents=[common], help="let an operator in (on the robot's machine)")
     allow.add_argument("name", metavar="NAME", help="a name for it: up to 32 letters, digits, - and _")
     allow.add_argument("key", metavar="KEY|FILE", help="the public key, or the .public file")
+    allow.add_argument(
+        "--role",
+        choices=KEY_ROLES,
+        default="operator",
+        help="what it may do: operator drives and watches, observer watches, driver is the arm's driver at --arm,"
+        " perception sends objects to --objects (operator)",
+    )
     actions.add_parser("list", parents=[common], help="list the keys in the folder, and the admitted peers")
     revoke = actions.add_parser("revoke", parents=[common], help="revoke an operator's key")
     revoke.add_argument("name", metavar="NAME")
@@ -103,7 +111,10 @@ def _listed(folder: KeyFolder) -> list[str]:
         if folder.secret_path(side).exists():
             lines.append(f"own      {side:<32} {public_part(folder.secret(side))}")
     peers = folder.peers()
-    lines += [f"allowed  {name:<32} {key}" for key, name in sorted(peers.names.items(), key=lambda item: item[1])]
+    lines += [
+        f"allowed  {name:<32} {key} {peers.roles[key]}"
+        for key, name in sorted(peers.names.items(), key=lambda item: item[1])
+    ]
     lines += [f"passed over: {fault}" for fault in peers.faults]
     if len(lines) == 1:
         lines.append(f"empty; to begin: {folder.command('make robot')}, or make operator")

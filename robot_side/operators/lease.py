@@ -4,6 +4,7 @@ import math
 from collections import deque
 from collections.abc import Iterator
 
+from common.peer_name import may_drive
 from common.protocol.link_end import LinkEnd
 from common.protocol.messages import MotionState
 from common.protocol.session import Session, SessionEvent, SessionState
@@ -87,8 +88,11 @@ class Lease:
         return iter(self._participants.values())
 
     def ask(self, participant: Participant, now_s: float) -> bool:
-        """Grant the lease if it is free, else admit the participant as an observer; False without room for another."""
-        if self._owner is None:
+        """Grant the lease if it is free, else admit the participant as an observer; False without room for another.
+
+        A participant whose key may only observe never gets it.
+        """
+        if self._owner is None and may_drive(participant.peer):
             participant.session.handle(SessionEvent.ASKED_WHILE_FREE)
             self._own(participant, now_s)
         elif len(self.observers()) < MOST_OBSERVERS:
@@ -145,7 +149,8 @@ class Lease:
             self._own(alive[0], now_s)
 
     def _alive(self, participants: list[Participant], now_s: float) -> list[Participant]:
-        return [one for one in participants if now_s - one.heard_s < self._safety.settings.lease_s]
+        limit_s = self._safety.settings.lease_s
+        return [one for one in participants if now_s - one.heard_s < limit_s and may_drive(one.peer)]
 
     def _forget(self, participant: Participant, event: SessionEvent, now_s: float) -> None:
         if participant is self._owner:

@@ -18,8 +18,8 @@ from common.companion.channel import Channel
 from common.companion.process import companion_channel
 from common.errors import ConfigurationError
 from common.realtime.priority import raise_descriptor_limit, raise_priority
-from common.sockets.admission import Admission
 from common.sockets.authentication import RobotKeys
+from common.sockets.door.admission import Admission
 from common.sockets.door.messages import (
     ROOM_BYTES,
     Asked,
@@ -77,6 +77,7 @@ class Keeper:
                         *(one.bind, flag, one.limit_bytes),
                         insecure=settings.insecure,
                         keys=self._keys,
+                        role=one.role,
                         bytes_per_s=one.bytes_per_s,
                     )
                 )

@@ -5,6 +5,7 @@ from typing import Final
 import msgspec
 from msgspec import Struct
 
+from common.sockets.key_files import KeyRole
 from common.sockets.tcp_figures import TcpFigures
 
 ROOM_BYTES: Final = 1 << 23
@@ -15,6 +16,8 @@ class DriverSettings(Struct, frozen=True):
     """Port to which programs of the user connect."""
 
     bind: str
+    role: KeyRole
+    """Role of the keys that are let in"""
     limit_bytes: int
     """Largest valid message"""
     bytes_per_s: float

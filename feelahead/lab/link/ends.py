@@ -15,7 +15,7 @@ from common.emulation.spec import Direction, LinkSpec
 from common.protocol.link_end import LinkEnd
 from common.protocol.uniform_field import FAR_M, uniform_field
 from common.realtime.pacing import Pacer, wait_for_turn
-from common.sockets.admission import Admission
+from common.sockets.door.admission import Admission
 from common.sockets.operator import OperatorSockets
 from common.sockets.robot import RobotSockets
 from common.timing.ages import LoopAge

@@ -22,11 +22,12 @@ _AWAITED: Final = {"--arm": "an arm's driver", "--objects": "a process that perc
 
 def driver_ports(arm: str | None, objects: str | None) -> dict[str, DriverSettings]:
     """Return the settings of the ports at which programs connect, keyed by flag."""
-    limits = (
-        ("--arm", arm, STATE_LIMIT_BYTES, _STATES_BYTES_PER_S),
-        ("--objects", objects, FRAME_LIMIT_BYTES, _FRAMES_BYTES_PER_S),
-    )
-    return {flag: DriverSettings(bind, most, per_s) for flag, bind, most, per_s in limits if bind is not None}
+    found: dict[str, DriverSettings] = {}
+    if arm is not None:
+        found["--arm"] = DriverSettings(arm, "driver", STATE_LIMIT_BYTES, _STATES_BYTES_PER_S)
+    if objects is not None:
+        found["--objects"] = DriverSettings(objects, "perception", FRAME_LIMIT_BYTES, _FRAMES_BYTES_PER_S)
+    return found
 
 
 class ConnectedDrivers:

@@ -5,6 +5,7 @@ A state machine lets peers send, flood, leave and be revoked; other tests check 
 
 from collections import Counter
 from dataclasses import dataclass
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -14,12 +15,14 @@ from hypothesis import Phase, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, precondition, rule
 
+from common.peer_name import peer_name
 from common.sockets import robot as robot_sockets
-from common.sockets.admission import AT_ONCE_S, EACH_OTHER_PER_S, OTHERS_PER_S, Admission
-from common.sockets.peers import peer_name_of
+from common.sockets.allow_list import AllowList
+from common.sockets.door.admission import AT_ONCE_S, EACH_OTHER_PER_S, OTHERS_PER_S, Admission
+from common.sockets.keys import KeyFolder
 from common.sockets.port_connections import PortConnections
 from common.sockets.robot import RobotSockets
-from common.sockets.round_robin import SILENCE_S, Offered, routing_id
+from common.sockets.round_robin import SILENCE_S, Offered, group_of, routing_id
 from tests.helpers.socket_talk import EPHEMERAL
 
 LIMIT = 8
@@ -46,7 +49,7 @@ class Line:
 
     @property
     def peer(self) -> bytes:
-        return peer_name_of(self.name, self.key)
+        return peer_name(self.key, group_of(self.name))
 
 
 class Connections(RuleBasedStateMachine):
@@ -58,7 +61,8 @@ class Connections(RuleBasedStateMachine):
 
     def __init__(self) -> None:
         super().__init__()
-        self.allowed = dict.fromkeys(KEYS, "")
+        self.list = AllowList(KeyFolder(Path("nowhere")), roles=dict.fromkeys(KEYS, "operator"))
+        self.allowed = self.list.roles
         self.second = 0
         self.open: dict[int, Line] = {}
         self.newest: dict[bytes, Line] = {}
@@ -73,7 +77,7 @@ class Connections(RuleBasedStateMachine):
         self.robot = RobotSockets(EPHEMERAL)
         for name, stand_in in (
             ("_clock", SimpleNamespace(now=lambda: float(self.second))),
-            ("_keys", SimpleNamespace(allowed=SimpleNamespace(names=self.allowed))),
+            ("_keys", SimpleNamespace(allowed=self.list)),
             ("_watch_connections", self.watch),
             ("offer", self.take),
         ):
@@ -119,7 +123,7 @@ class Connections(RuleBasedStateMachine):
     @rule(key=st.sampled_from(KEYS))
     def allow_or_revoke(self, key: str) -> None:
         if self.allowed.pop(key, None) is None:
-            self.allowed[key] = ""
+            self.allowed[key] = "operator"
 
     @rule()
     def a_second_passes(self) -> None:
@@ -166,7 +170,7 @@ class Connections(RuleBasedStateMachine):
             assert admitted == count or own | (known & of_peer) <= set(self.ended), "who floods or was revoked stays"
         for descriptor in sorted(set(self.ended)):
             self.leave(descriptor)
-        for name in sorted({line.peer, *(peer_name_of(name, key) for name in NAMES for key in KEYS), b"nobody"}):
+        for name in sorted({line.peer, *(peer_name(key, group_of(name)) for name in NAMES for key in KEYS), b"nobody"}):
             self.tell(name)
 
     def tell(self, peer: bytes) -> None:

@@ -89,8 +89,8 @@ def test_a_key_gets_in_once_it_is_allowed_and_is_not_heard_once_it_is_revoked(tm
             port.wait(0.01)
             if told := port.refresh_keys():
                 break
-        assert told == [f"refused an unknown key; to let it in: {folder.command(f'allow NAME {public}')}"]
-        folder.allow("driver", public)
+        assert told == [f"refused an unknown key; to let it in: {folder.command(f'allow NAME {public} --role driver')}"]
+        folder.allow("driver", public, "driver")
         assert port.refresh_keys() == []
         # ZeroMQ does not retry a refused connection.
         part.disconnect(port.endpoint)
@@ -106,3 +106,39 @@ def test_a_key_gets_in_once_it_is_allowed_and_is_not_heard_once_it_is_revoked(tm
             if port.revoked:
                 return
         pytest.fail("it is let in still")
+
+
+def test_an_operators_key_does_not_drive_the_arm_and_a_changed_role_counts_at_once(tmp_path: Path) -> None:
+    folder, (robot, secret), (public, ours) = KeyFolder(tmp_path), make_key_pair(), make_key_pair()
+    folder.write_pair("robot", robot, secret)
+    folder.allow("anna", public)
+    with (
+        DriverPort(EPHEMERAL, "--arm", LIMIT_BYTES, keys=RobotKeys.load(tmp_path)) as port,
+        zmq.Context() as context,
+        context.socket(zmq.DEALER) as part,
+    ):
+        part.setsockopt(zmq.LINGER, 0)
+        OperatorKeys(ours, robot).secure(part)
+        part.connect(port.endpoint)
+        part.send(b"state")
+        for _ in range(_ROUNDS):
+            port.wait(0.01)
+            assert port.receive() == []
+            if told := port.refresh_keys():
+                break
+        assert told == ["refused anna, whose role is operator, where driver is let in (feelahead keys allow --help)"]
+        folder.allow("anna", public, "driver")
+        port.refresh_keys()
+        part.disconnect(port.endpoint)
+        part.connect(port.endpoint)
+        part.send(b"state")
+        assert [payload for _, payload in heard(port)] == [b"state"]
+        folder.allow("anna", public, "observer")
+        port.refresh_keys()
+        for _ in range(_ROUNDS):
+            part.send(b"state")
+            port.wait(0.01)
+            assert port.receive() == []
+            if port.revoked:
+                return
+        pytest.fail("it drives still")

@@ -8,10 +8,12 @@ import pytest
 
 from common.errors import ConfigurationError
 from common.files.regular_file import read_regular_file
-from common.sockets import keys
+from common.sockets import key_files
+from common.sockets import keys as keys_module
 from common.sockets.allow_list import AllowList
 from common.sockets.authentication import OperatorKeys, RobotKeys
-from common.sockets.keys import KeyFolder, checked_key, checked_name, read_public_key
+from common.sockets.key_files import checked_key
+from common.sockets.keys import KeyFolder, checked_name, read_public_key
 
 KEY, OTHER = "ab" * 32, "cd" * 32
 
@@ -141,7 +143,7 @@ def test_a_secret_key_is_not_given_away(folder: KeyFolder) -> None:
 
 
 def test_the_number_of_peers_is_bounded(folder: KeyFolder, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(keys, "PEER_LIMIT", 3)
+    monkeypatch.setattr(keys_module, "PEER_LIMIT", 3)
     for number in range(3):
         folder.allow(f"peer{number}", f"{number:064x}")
     assert "up to 3" in complaint(lambda: folder.allow("more", KEY))
@@ -221,7 +223,7 @@ def test_a_file_that_vanishes_while_it_is_looked_at_throws_nobody_else_out(
         folder.peer_path("anna").unlink(missing_ok=True)
         return read_regular_file(path, largest_bytes)
 
-    monkeypatch.setattr(keys, "read_regular_file", read_late)
+    monkeypatch.setattr(key_files, "read_regular_file", read_late)
     assert allowed.refresh() == {KEY}
     assert allowed.names == {OTHER: "ben", "ef" * 32: "carl"}
     allowed.refresh()
@@ -288,3 +290,62 @@ def test_a_key_that_is_let_in_twice_is_named_when_one_name_is_revoked(folder: Ke
     assert "still let in as zed" in complaint(lambda: folder.revoke("alice"))
     folder.revoke("zed")
     assert folder.allowed() == {}
+
+
+def test_a_role_is_kept_with_its_key_and_a_file_without_one_is_an_operators(folder: KeyFolder) -> None:
+    folder.allow("anna", KEY, "observer")
+    folder.allow("arm", OTHER, "driver")
+    allowed = AllowList(folder)
+    assert allowed.refresh() == set()
+    assert allowed.admits(KEY, ("operator", "observer"))
+    assert not allowed.admits(KEY, ("operator", "driver"))
+    folder.peer_path("arm").write_text(f"{OTHER}\n")
+    assert allowed.refresh() == {OTHER}
+    assert allowed.roles == {KEY: "observer", OTHER: "operator"}
+    folder.peer_path("arm").write_text(f"{OTHER}\nking\n")
+    assert allowed.refresh() == {OTHER}
+    [fault] = allowed.faults
+    assert "'king'" in fault
+    assert "operator, observer, driver, perception" in fault
+
+
+def test_one_key_under_two_names_has_one_role(folder: KeyFolder) -> None:
+    folder.allow("anna", KEY, "observer")
+    folder.peer_path("ben").write_text(f"{KEY}\ndriver\n")
+    peers = folder.peers()
+    assert peers.roles == {KEY: "observer"}
+    assert "one role for each key" in peers.faults[0]
+
+
+@pytest.mark.parametrize("fault", ["a link", "2 names", "mode 0666", "belongs to user"])
+def test_a_file_that_others_may_change_lets_nobody_in_and_the_others_stay(
+    folder: KeyFolder, allowed: AllowList, tmp_path: Path, fault: str
+) -> None:
+    folder.allow("ben", OTHER)
+    path, elsewhere = folder.peer_path("ben"), tmp_path / "elsewhere"
+    if fault == "a link":
+        path.rename(elsewhere)
+        path.symlink_to(elsewhere)
+    elif fault == "2 names":
+        os.link(path, elsewhere)
+    elif fault == "mode 0666":
+        path.chmod(0o666)
+    elif os.geteuid() == 0:
+        os.chown(path, 12345, 12345)
+    else:
+        pytest.skip("only root gives a file to another user")
+    allowed.refresh()
+    assert allowed.names == {KEY: "anna"}
+    [said] = allowed.faults
+    assert fault in said
+    assert "valid: " in said
+
+
+def test_a_folder_above_that_others_may_write_to_is_named(tmp_path: Path) -> None:
+    open_to_all = tmp_path / "shared"
+    folder = KeyFolder(open_to_all / "keys")
+    folder.allow("anna", KEY)
+    open_to_all.chmod(0o777)
+    assert f"{open_to_all}: other users may write there (mode 0777)" in complaint(folder.allowed)
+    open_to_all.chmod(0o1777)  # As /tmp, where nobody renames what belongs to another user.
+    assert folder.allowed() == {KEY: "anna"}

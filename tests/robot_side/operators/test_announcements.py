@@ -4,6 +4,7 @@ import msgspec
 import numpy as np
 import pytest
 
+from common.peer_name import peer_name
 from common.protocol.codec import PROTOCOL_VERSION, decode, encode
 from common.protocol.messages import AnyMessage, Hello, LeaseNotice, StiffnessUpdate
 from common.protocol.session import SessionState
@@ -26,6 +27,17 @@ def test_the_first_owns_and_the_next_observe(bench: Bench) -> None:
     assert [notice.place for notice in notices if notice is not None] == [0, 1, 2]
     assert [notice.waiting for notice in notices if notice is not None] == [2, 2, 2]
     assert {one.token for one in operators} == {bench.robot.session.lease.token}
+
+
+def test_a_key_that_may_only_observe_never_owns_nor_is_handed_the_lease(bench: Bench) -> None:
+    observer = bench.join(2, peer_name("observer", b"one", observes=True))
+    assert observer.state is SessionState.OBSERVING
+    driver = bench.join(3, peer_name("driver", b"two"))
+    assert driver.state is SessionState.DISARMED
+    assert not bench.robot.session.lease.hand_over(bench.now_s)
+    bench.silence(1.0)
+    bench.say_hello(observer)
+    assert bench.robot.session.lease.owner is None
 
 
 def test_observers_feel_at_a_reduced_rate_and_see_the_robots_state(bench: Bench) -> None:

@@ -29,7 +29,9 @@ from common.sockets.door.messages import (
 )
 from common.sockets.tcp_figures import TcpFigures
 
-SETTINGS = DoorSettings("tcp://127.0.0.1:0", drivers={"--arm": DriverSettings("tcp://127.0.0.1:0", 4096, 1e6)})
+SETTINGS = DoorSettings(
+    "tcp://127.0.0.1:0", drivers={"--arm": DriverSettings("tcp://127.0.0.1:0", "driver", 4096, 1e6)}
+)
 BOUND = Ready({"--arm": "tcp://127.0.0.1:5002"}, [])
 AT = Listening("tcp://127.0.0.1:5000", "tcp://127.0.0.1:5001")
 
