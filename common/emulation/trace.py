@@ -3,24 +3,33 @@
 import contextlib
 import csv
 import gzip
+import io
 import itertools
 import math
 import zlib
+from array import array
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NoReturn
+from typing import BinaryIO, NoReturn, cast
 
 import numpy as np
 
 from common.arrays import FloatArray
 from common.errors import ConfigurationError
-from common.files.regular_file import read_regular_file
+from common.files.regular_file import regular_file
 
 _MOST_ROWS = 1_000_000
-_LARGEST_BYTES = 100 * _MOST_ROWS
+_LONGEST_LINE = 10_000
+_LARGEST_NUMBER = 1e19
+_NUMBERS = ("seq", "sent_ns", "received_ns", "delay_ns")
 _COLUMNS = (
     "a heading line and the columns delay_ns, or sent_ns and received_ns; also seq if rows are not in order of sending"
 )
+
+
+_Refuse = Callable[..., NoReturn]
+"""Function of what is wrong, what is valid, and the row's number, if any, that raises the error"""
 
 
 @dataclass(frozen=True)
@@ -64,41 +73,21 @@ def read_samples(path: Path, field: str) -> tuple[FloatArray, FloatArray]:
         raise ConfigurationError(f"{field}: {str(path)!r}{where} {what}; valid: {valid}")
 
     try:
-        text = read_regular_file(path, _LARGEST_BYTES)
-        if path.suffix == ".gz":
-            text = gzip.decompress(text)
-        lines = text.decode("utf-8-sig").splitlines()
-        table = csv.DictReader(lines)
-        names = set(table.fieldnames or ())
-        rows = list(itertools.islice(table, _MOST_ROWS + 1))
+        columns = _read_columns(path, refuse)
+    except ConfigurationError:
+        raise
     except (OSError, EOFError, ValueError, zlib.error, csv.Error) as error:
         refuse(
             f"cannot be read: {getattr(error, 'strerror', None) or 'it is no CSV file'}", f"a CSV file with {_COLUMNS}"
         )
-    if not ("delay_ns" in names or {"sent_ns", "received_ns"} <= names):
-        refuse(f"has the columns {', '.join(sorted(map(str, names)))[:80] or 'none'}", _COLUMNS)
-    if len(rows) > _MOST_ROWS:
-        refuse("has too many rows", f"up to {_MOST_ROWS} rows")
-
-    def column(name: str) -> FloatArray:
-        """Return a column (n,); NaN for empty entries."""
-        values = np.full(len(rows), np.nan)
-        for number, row in enumerate(rows):
-            if entry := (row.get(name) or "").strip():
-                with contextlib.suppress(ValueError):
-                    values[number] = float(entry)
-                if not abs(values[number]) < 1e19:
-                    refuse(f"{name} = {entry[:40]!r}", "a number, or nothing for a lost message", number)
-        return values
-
-    sent_ns = column("sent_ns")
-    delays_ns = column("delay_ns") if "delay_ns" in names else column("received_ns") - sent_ns
+    sent_ns = columns.get("sent_ns", np.full(len(next(iter(columns.values()))), np.nan))
+    delays_ns = columns["delay_ns"] if "delay_ns" in columns else columns["received_ns"] - sent_ns
     for number in np.flatnonzero(delays_ns < 0.0)[:1].tolist():
         refuse(f"the delay is {delays_ns[number]:.0f} ns", "0 ns or more", number)
-    key = next((name for name in ("seq", "sent_ns") if name in names), None)
+    key = next((name for name in ("seq", "sent_ns") if name in columns), None)
     if key is None:
         return 1e-9 * sent_ns, 1e-9 * delays_ns
-    keys = column(key)
+    keys = columns[key]
     for number in np.flatnonzero(np.isnan(keys))[:1].tolist():
         refuse(f"{key} is empty", "a number", number)
     order = np.argsort(keys, kind="stable")
@@ -113,3 +102,39 @@ def read_samples(path: Path, field: str) -> tuple[FloatArray, FloatArray]:
         delays_ns[places] = found_ns
         sent_ns = np.interp(every, places, sent_ns)
     return 1e-9 * sent_ns, 1e-9 * delays_ns
+
+
+def _read_columns(path: Path, refuse: _Refuse) -> dict[str, FloatArray]:
+    """Return the columns of numbers, (n,) each; NaN for empty entries."""
+    with regular_file(path) as file:
+        table = csv.reader(_lines(path, file, refuse))
+        names = next(table, [])
+        if not ("delay_ns" in names or {"sent_ns", "received_ns"} <= set(names)):
+            refuse(f"has the columns {', '.join(sorted(names))[:80] or 'none'}", _COLUMNS)
+        places = {name: place for place, name in enumerate(names) if name in _NUMBERS}
+        values = {name: array("d") for name in places}
+        for number, row in enumerate(filter(None, table)):
+            for name, place in places.items():
+                entry, value = row[place].strip() if place < len(row) else "", math.nan
+                if entry:
+                    with contextlib.suppress(ValueError):
+                        value = float(entry)
+                    if not abs(value) < _LARGEST_NUMBER:
+                        refuse(f"{name} = {entry[:40]!r}", "a number, or nothing for a lost message", number)
+                values[name].append(value)
+        return {name: np.array(column) for name, column in values.items()}
+
+
+def _lines(path: Path, file: BinaryIO, refuse: _Refuse) -> Iterator[str]:
+    """Yield the file's lines, unpacked one by one: a small file may unpack to any size."""
+    packed = cast("BinaryIO", gzip.GzipFile(fileobj=file)) if path.suffix == ".gz" else file
+    with io.TextIOWrapper(packed, encoding="utf-8-sig") as text:
+        for count in itertools.count():
+            line = text.readline(_LONGEST_LINE + 1)
+            if not line:
+                return
+            if count > _MOST_ROWS:
+                refuse("has too many rows", f"up to {_MOST_ROWS} rows")
+            if len(line) > _LONGEST_LINE:
+                refuse("has too long a line", f"up to {_LONGEST_LINE} characters", count - 1)
+            yield line

@@ -1,4 +1,5 @@
 import gzip
+import tracemalloc
 from pathlib import Path
 
 import numpy as np
@@ -42,6 +43,29 @@ def test_reads_compressed_files(tmp_path: Path) -> None:
     path.write_bytes(gzip.compress(b"delay_ns\n1000000\n" * 99)[:-12])
     with pytest.raises(ConfigurationError, match=r"trace\.csv\.gz"):
         Trace.read(path, "trace")
+
+
+@pytest.mark.parametrize(
+    ("rest", "named"),
+    [
+        (b"\n", "has too many rows; valid: up to 1000 rows"),
+        (b"1\n", "has too many rows; valid: up to 1000 rows"),
+        (b" ", "row 1: has too long a line; valid: up to 100 characters"),
+    ],
+)
+def test_a_small_file_that_unpacks_to_a_large_one_is_refused_before_it_fills_the_memory(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, rest: bytes, named: str
+) -> None:
+    monkeypatch.setattr("common.emulation.trace._MOST_ROWS", 1000)
+    monkeypatch.setattr("common.emulation.trace._LONGEST_LINE", 100)
+    path = tmp_path / "bomb.csv.gz"
+    path.write_bytes(gzip.compress(b"delay_ns\n" + rest * 4_000_000))
+    tracemalloc.start()
+    try:
+        assert named in refusal(Trace.read, path, "trace")
+        assert tracemalloc.get_traced_memory()[1] < 1e6
+    finally:
+        tracemalloc.stop()
 
 
 def test_lost_messages_were_sent_between_their_neighbours(tmp_path: Path) -> None:
