@@ -17,15 +17,18 @@ from typing import Any, Final
 import numpy as np
 
 from common.arrays import FloatArray
-from common.errors import FeelaheadError
+from common.errors import ConfigurationError, FeelaheadError
 from common.recording.reading import Recording
 from feelahead.recordings.demonstrations import Demonstrations, Episode, Picture
+from feelahead.recordings.jpeg import decoded, size_of
 
 _VERSION: Final = "v3.0"
 _FILE: Final = "chunk-{chunk_index:03d}/file-{file_index:03d}"
 _TASK: Final = "reach the target, grasp it, lift it and set it down"
 _SAMPLED_PICTURES: Final = 20
 """About the maximum number of pictures from which the statistics are computed."""
+_SAMPLED_PIXELS: Final = 640
+"""Maximum number of pixels of each row and column from which they are computed."""
 _ENLARGED_QUALITY: Final = 90
 
 
@@ -40,6 +43,8 @@ def export_lerobot(recording: Recording, frames: Demonstrations, folder: Path) -
             writer = f"lerobot {importlib.metadata.version('lerobot')}"
             try:
                 _write_by(library, recording, frames, folder)
+            except ConfigurationError:
+                raise
             except (ArithmeticError, LookupError, RuntimeError, TypeError, ValueError) as error:
                 raise FeelaheadError(f"{writer} cannot write {folder}: {error}") from error
             return f"written by {writer}, pictures as video"
@@ -50,7 +55,6 @@ def export_lerobot(recording: Recording, frames: Demonstrations, folder: Path) -
 
 def _write_by(library: Any, recording: Recording, frames: Demonstrations, folder: Path) -> None:
     """Write the dataset by LeRobot's own writer, and add the episodes' success to its metadata."""
-    from PIL import Image  # noqa: PLC0415
     from pyarrow import array, bool_, parquet  # noqa: PLC0415
 
     values = {name: vector.values for name, vector in frames.vectors.items()} | _results(frames)
@@ -65,7 +69,7 @@ def _write_by(library: Any, recording: Recording, frames: Demonstrations, folder
     )
     for one in frames.episodes:
         for row in range(one.first, one.end):
-            shown = {key: np.asarray(Image.open(io.BytesIO(of[row].jpeg)).convert("RGB")) for key, of in seen.items()}
+            shown = {key: np.asarray(decoded(of[row].jpeg)) for key, of in seen.items()}
             made.add_frame({name: column[row] for name, column in values.items()} | shown | {"task": _TASK})
         made.save_episode()
     made.finalize()
@@ -157,17 +161,15 @@ def _of_one_size(shown: list[Picture]) -> tuple[list[Picture], tuple[int, int]]:
 
     Return the pictures and their (width, height).
     """
-    from PIL import Image  # noqa: PLC0415
-
-    opened = [Image.open(io.BytesIO(picture.jpeg)) for picture in shown]
-    largest = max(one.size for one in opened)
+    sizes = [size_of(picture.jpeg) for picture in shown]
+    largest = max(sizes)
     alike = []
-    for picture, one in zip(shown, opened, strict=True):
-        if one.size == largest:
+    for picture, size in zip(shown, sizes, strict=True):
+        if size == largest:
             alike.append(picture)
             continue
         enlarged = io.BytesIO()
-        one.resize(largest).save(enlarged, "JPEG", quality=_ENLARGED_QUALITY)
+        decoded(picture.jpeg).resize(largest).save(enlarged, "JPEG", quality=_ENLARGED_QUALITY)
         alike.append(picture._replace(jpeg=enlarged.getvalue()))
     return alike, largest
 
@@ -180,10 +182,12 @@ def _statistics(values: FloatArray) -> dict[str, Any]:
 
 def _picture_statistics(shown: list[Picture]) -> dict[str, Any]:
     """Return each statistic of the pictures' colours, 0 to 1, in the shape (3, 1, 1)."""
-    from PIL import Image  # noqa: PLC0415
-
     step = max(1, len(shown) // _SAMPLED_PICTURES)
-    points = [np.asarray(Image.open(io.BytesIO(one.jpeg)).convert("RGB")).reshape(-1, 3) for one in shown[::step]]
+    points = []
+    for one in shown[::step]:
+        colors = np.asarray(decoded(one.jpeg))
+        apart = -(-max(colors.shape) // _SAMPLED_PIXELS)
+        points.append(colors[::apart, ::apart].reshape(-1, 3))
     found = _statistics(np.concatenate(points) / 255.0)
     return {name: values if name == "count" else [[[value]] for value in values] for name, values in found.items()} | {
         "count": [len(points)]
