@@ -16,6 +16,7 @@ import tyro
 
 from common.command.flag_value import value_of
 from common.command.stop_signal import STOP_SIGNALS, ignore_broken_output, say_output_failed
+from common.command.words import printable
 from common.errors import ConfigurationError, FeelaheadError
 from common.files.toml_complaint import explain
 from common.files.toml_file import read_toml
@@ -98,7 +99,7 @@ def run_command(program: str, command: Callable[[Sequence[str]], int]) -> None:
         if sys.stdout is not None:
             sys.stdout.flush()
     except FeelaheadError as error:
-        print(f"{program}: {error}", file=sys.stderr)
+        print(printable(f"{program}: {error}"), file=sys.stderr)
         code = 2 if isinstance(error, ConfigurationError) else 1
     except BrokenPipeError:
         # The reader of our output has ended, as `head` does.
@@ -107,7 +108,7 @@ def run_command(program: str, command: Callable[[Sequence[str]], int]) -> None:
     except OSError as error:
         if error.filename is not None:
             # A file or folder that a person named is inaccessible.
-            print(f"{program}: {str(error.filename)[:200]}: {error.strerror}", file=sys.stderr)
+            print(printable(f"{program}: {str(error.filename)[:200]}: {error.strerror}"), file=sys.stderr)
             code = 2
         elif error.errno in _NO_ROOM:
             code = say_output_failed(program, error)

@@ -7,7 +7,6 @@ from typing import NamedTuple
 
 from common.command.live_line import millimetres, percent
 from common.command.live_view import LiveView, TriggerView, number
-from common.command.words import printable
 from common.status.codes import LinkState
 
 SHORTEST_GAP_S = 0.4
@@ -83,7 +82,7 @@ def _next_state(before: _State, view: LiveView) -> _State:
     if nearest_mm is None or nearest_mm > _APART_AGAIN_MM:
         touched = None
     elif nearest_mm <= 0.0 and touched is None and view.robot.nearest is not None:
-        touched = printable(view.robot.nearest)
+        touched = view.robot.nearest
     resistances = (
         next_resistance(was, one.resists or 0.0) for was, one in zip(before.resistances, view.triggers, strict=True)
     )

@@ -5,7 +5,7 @@
 
 from typing import NamedTuple
 
-from common.command.words import phase_words, printable
+from common.command.words import phase_words
 from common.status.phase import phase_of
 from common.status.statuses import OperatorStatus, RobotStatus
 
@@ -42,9 +42,9 @@ class LiveView:
             TriggerView("R2", number(side.r2_pulled), 0.0 if free else number(side.r2)),
         )
         held = self.scene.holding
-        self.holding = printable(held) if isinstance(held, str) else "something" if held else None
+        self.holding = held if isinstance(held, str) else "something" if held else None
         """Name of the object between the fingers, "something" if the name is unknown, None for no object."""
-        self.hindrance = None if self.scene.hindrance is None else printable(self.scene.hindrance)
+        self.hindrance = self.scene.hindrance
         """Cause for which the arm does not follow the command, in words; None if it follows"""
         self.stands = ", it stands" if self.scene.stands else ""
 

@@ -14,6 +14,7 @@ from common.command.live_line import live_line
 from common.command.live_story import Story
 from common.command.live_view import LiveView
 from common.command.patient_output import PatientOutput
+from common.command.words import printable
 from common.status.statuses import OperatorStatus, RobotStatus, joined
 
 StatusMode = Literal["line", "json", "facts", "none"]
@@ -34,6 +35,8 @@ class Status:
 
     While the context is open, no call waits for the reader of the output: if the reader stalls, texts are dropped. A
     note after the context is a result, and waits for the reader.
+
+    Texts come from others, too: their control characters become question marks, so that nobody else can write a line.
     """
 
     def __init__(self, mode: StatusMode, program: str) -> None:
@@ -90,11 +93,11 @@ class Status:
         view = LiveView(robot, operator)
         if self._live is not None:
             # The last column stays free: some terminals break the line when it is filled.
-            text = live_line(view, self._console.width - 1)
+            text = printable(live_line(view, self._console.width - 1))
             style = "bold red" if view.alarm else ""
             self._live.update(Text(text, style=style, overflow="crop", no_wrap=True), refresh=True)
         elif (reported := self._story.tell(now_s, view)) is not None:
-            self._output.write(f"{reported}\n")
+            self._output.write(f"{printable(reported)}\n")
 
     def show_facts(self, facts: Any) -> None:
         """Write `facts`, a struct of all that the console shows, at once; only in the mode "facts"."""
@@ -103,7 +106,10 @@ class Status:
 
     def _write(self, event: dict[str, Any]) -> None:
         # Numbers that are not finite become null.
-        self._output.write(msgspec.json.encode(event).decode() + "\n")
+        line = msgspec.json.encode(event).decode()
+        if not line.isprintable():  # somebody may look at the lines in a terminal
+            line = "".join(sign if sign.isprintable() else json.dumps(sign)[1:-1] for sign in line)
+        self._output.write(f"{line}\n")
 
     def event(self, kind: str, **values: str | int) -> bool:
         """Write an event as one line of JSON at once. In modes without JSON, do nothing and return False."""
@@ -120,4 +126,4 @@ class Status:
         elif self._mode == "line":
             # Wrapped between words for a person, left whole for a search in a file.
             whole = not self._console.is_terminal
-            self._console.print(f"{self._program}: {text}", markup=False, highlight=False, soft_wrap=whole)
+            self._console.print(f"{self._program}: {printable(text)}", markup=False, highlight=False, soft_wrap=whole)

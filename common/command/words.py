@@ -32,7 +32,7 @@ def phase_words(facts: PhaseFacts, side: RobotStatus | OperatorStatus | None) ->
         said = link_words(side)
     elif facts.phase is Phase.LINK_LOST and reason is None:
         reason = _LOST.format("operator" if isinstance(side, RobotStatus) else "robot")
-    return printable(said.upper() if facts.alarm else said), None if reason is None else printable(reason)
+    return said.upper() if facts.alarm else said, reason
 
 
 def link_words(side: RobotStatus | OperatorStatus | None) -> str:

@@ -107,13 +107,6 @@ def test_the_target_in_other_words(changed: dict[str, Any], expected: str) -> No
     assert expected in live_line(approach(**changed), 79)
 
 
-def test_control_characters_of_a_peer_do_not_reach_the_terminal() -> None:
-    refused = OperatorStatus(link=LinkState.REFUSED, link_reason="\x1b[2J\nhello")
-    view = LiveView(RobotStatus(nearest="a\rb", nearest_mm=0.0, holding="\x07"), refused)
-    assert (view.reason, view.holding) == ("?[2J?hello", "?")
-    assert told(view) == ["   0.0 s  REFUSED: ?[2J?hello; touches a?b, as perceived; holds ?"]
-
-
 @given(view=views, width=st.integers(0, 200))
 @example(view=approach(), width=79)
 @example(view=approach(link=LinkState.LOST, link_reason="界" * 5), width=19)

@@ -1,12 +1,17 @@
 import contextlib
 import json
 import math
+import signal
+from collections.abc import Sequence
 from typing import Any
 
 import msgspec
 import pytest
+import rich.console
 
+from common.command.command_line import run_command
 from common.command.status import Status, StatusMode
+from common.errors import ConfigurationError
 from common.status.codes import LinkState
 from common.status.statuses import OperatorStatus, RobotStatus
 
@@ -56,6 +61,47 @@ def test_notes_are_for_people_and_programs_and_events_for_programs(capsys: pytes
     # Long notes are not broken into lines, and brackets are no markup.
     of_programs = [json.dumps({"event": "note", "text": text}), '{"event": "listening"}']
     assert of_mode == {"line": [f"robot: {text}"], "json": of_programs, "none": []}
+
+
+HOSTILE = "a\x1b[2Jb\nrobot: listening\x9b1m\u202e\U000e0001"
+
+
+def test_texts_of_others_write_no_line_and_move_no_cursor(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    stopped = RobotStatus(link=LinkState.UP, state="stopped", stopped_because=HOSTILE, holding=HOSTILE)
+    touching = RobotStatus(link=LinkState.UP, state="armed", hindrance=HOSTILE, nearest=HOSTILE, nearest_mm=0.0)
+    modes: tuple[StatusMode, ...] = ("line", "json")
+    for mode in modes:
+        with Status(mode, "robot") as status:
+            status.note(HOSTILE)
+            status.show(0.0, robot=stopped)
+            status.show(9.0, robot=touching)
+        lines = shown(capsys)
+        assert len(lines) == 3
+        assert all(line.isprintable() for line in lines)
+    assert [json.loads(line) for line in lines][1]["stopped_because"] == HOSTILE
+    monkeypatch.setattr(rich.console.Console, "is_terminal", True)
+    monkeypatch.setenv("TERM", "xterm")
+    with Status("line", "robot") as status:
+        status.show(0.0, robot=stopped)
+        status.note(HOSTILE)
+    assert "[2J" in (drawn := capsys.readouterr().out)
+    assert not {"\x1b[2J", "\x9b", "\u202e"} & {drawn[at : at + size] for at in range(len(drawn)) for size in (1, 4)}
+
+
+def test_the_error_of_a_command_is_one_line(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(_: Sequence[str]) -> int:
+        raise ConfigurationError(f"model: {HOSTILE}; valid: another one")
+
+    monkeypatch.setattr(signal, "signal", lambda *_: None)
+    with pytest.raises(SystemExit):
+        run_command("robot", refuse)
+    [line] = capsys.readouterr().err.splitlines()
+    assert line.isprintable()
+    assert line.startswith("robot: model: a?[2Jb?robot: listening?1m")
 
 
 class Facts(msgspec.Struct):
