@@ -9,7 +9,13 @@ from av.video.codeccontext import VideoCodecContext
 
 from common.protocol.view_messages import VIEW_NAMES, VideoFrame, VideoStep, ViewName
 
-_MOST_PIXELS: Final = 4096 * 4096
+_ALIGNED: Final = 64
+"""Pixels to whole multiples of which FFmpeg widens pictures at most"""
+_UNIT: Final = b"\0\0\1"
+"""Beginning of each unit of an access unit"""
+_MOST_UNITS: Final = 64
+"""Maximum number of units of a picture; x264 makes one for each slice, and a few more. FFmpeg takes 4 kB for each, even
+for an empty one."""
 _JPEG_SCALE: Final = 2
 """Quantiser scale of FFmpeg's MJPEG, 1 (best) to 31; 2 is about JPEG quality 90. These pictures never cross the
 link."""
@@ -20,7 +26,7 @@ class Steps:
 
     def __init__(self) -> None:
         """Raises av.FFmpegError or ValueError if the installed FFmpeg has no H.264 decoder or no JPEG encoder."""
-        _decoder()
+        _decoder(16, 16)
         _jpeg_encoder(16, 16)
         self._views: dict[ViewName, _View] = {}
 
@@ -47,11 +53,12 @@ class _View:
 
     def decode(self, step: VideoStep) -> bytes | None:
         if step.whole:
-            self._decoder = _decoder()
+            self._decoder = _decoder(step.width, step.height)
         elif step.number != self._number + 1:
             self._decoder = None
         self._number = step.number
-        jpeg = None if self._decoder is None else self._jpeg(self._decoder, step)
+        few = step.h264.count(_UNIT) <= _MOST_UNITS
+        jpeg = self._jpeg(self._decoder, step) if self._decoder is not None and few else None
         if jpeg is None:
             self._decoder = None
         self.lacks = step.number if jpeg is None else 0
@@ -71,11 +78,13 @@ class _View:
         return bytes(packet)
 
 
-def _decoder() -> VideoCodecContext:
+def _decoder(width: int, height: int) -> VideoCodecContext:
+    """Return a decoder that has no room for pictures larger than this."""
+    columns, rows = -(-width // _ALIGNED), -(-height // _ALIGNED)
     decoder = CodecContext.create("h264", "r")
     decoder.thread_count = 1
     decoder.flags |= Flags.low_delay
-    decoder.options = {"max_pixels": str(_MOST_PIXELS)}
+    decoder.options = {"max_pixels": str(columns * rows * _ALIGNED**2)}
     return decoder
 
 

@@ -1,8 +1,13 @@
 """Pictures encoded in H.264 by the robot side, and decoded to JPEG by the operator side."""
 
+import resource
+
+import msgspec
 import numpy as np
 import pytest
 import simplejpeg
+from hypothesis import given
+from hypothesis import strategies as st
 
 from common.protocol.messages import Header
 from common.protocol.view_messages import VideoStep
@@ -28,6 +33,9 @@ def step(encoder: H264, picture: Image, quality: int = 90, *, whole: bool = Fals
     content, is_whole = encoder.encode(picture, quality, whole=whole)
     height, width, _ = picture.shape
     return VideoStep(HEADER, "first_person", 1.5, width, height, encoder.number, is_whole, content)
+
+
+WHOLE = step(H264(), moving(0)).h264
 
 
 def error(steps: Steps, sent: VideoStep, picture: Image) -> float | None:
@@ -83,6 +91,39 @@ def test_another_size_or_quality_begins_with_a_whole_picture() -> None:
         found = error(steps, sent, picture)
         assert found is not None
         assert found < 16.0
+
+
+@pytest.mark.parametrize("unit", [b"\x67", b"\x68", b"\x09\xf0"])
+def test_a_picture_of_many_empty_units_takes_no_memory(unit: bytes) -> None:
+    encoder, steps = H264(), Steps()
+    whole = step(encoder, moving(0))
+    before_kb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    many = whole.h264 + 50_000 * (b"\0\0\1" + unit)
+    assert steps.decode(msgspec.structs.replace(whole, h264=many)) is None
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before_kb < 50_000  # 200 MB before
+    assert steps.decode(whole) is not None
+
+
+@pytest.mark.parametrize("size", [(161, 95), (640, 480), (4096, 2160)])
+def test_pictures_of_any_size_are_decoded(size: tuple[int, int]) -> None:
+    width, height = (2 * (part // 2) for part in size)
+    assert Steps().decode(step(H264(), moving(0, width, height))) is not None
+
+
+def test_a_picture_larger_than_its_message_states_is_not_decoded(monkeypatch: pytest.MonkeyPatch) -> None:
+    steps = Steps()
+    stated = VideoStep(HEADER, "first_person", 1.5, 160, 96, 1, True, step(H264(), moving(0, 640, 480)).h264)
+    monkeypatch.setattr("common.video.steps._jpeg_encoder", lambda *_: pytest.fail("the picture was decoded"))
+    assert steps.decode(stated) is None
+
+
+@given(st.lists(st.tuples(st.sampled_from([0, 1, 5, 6, 7, 8, 9]), st.binary(max_size=60)), max_size=6), st.booleans())
+def test_any_units_are_a_picture_or_lacking(units: list[tuple[int, bytes]], whole: bool) -> None:
+    content = b"".join(b"\0\0\1" + bytes([0x60 | kind]) + rest for kind, rest in units)
+    steps = Steps()
+    steps.decode(VideoStep(HEADER, "overview", 1.5, 160, 96, 1, True, WHOLE))
+    frame = steps.decode(VideoStep(HEADER, "overview", 1.5, 160, 96, 2, whole, content))
+    assert steps.lacks == ((2, 0) if frame is None else (0, 0))
 
 
 @pytest.mark.parametrize("content", [b"", b"\x00", bytes(1000), b"\x00\x00\x00\x01\x67" + bytes(range(200))])
