@@ -7,9 +7,11 @@
 Arrays are sent as bytes, little-endian, row by row; the docstrings of the fields give their shapes.
 """
 
+import math
 from typing import Annotated, Final, Literal
 
 import msgspec
+import numpy as np
 from msgspec import Meta
 
 from common.limits import Finite
@@ -21,9 +23,12 @@ ShapeKind = Literal["sphere", "box", "cylinder", "capsule", "ellipsoid", "plane"
 
 VIDEO_TOPIC: Final = b"video"
 SCENE_TOPIC: Final = b"scene"
+_Index = Annotated[int, Meta(ge=0, le=2**31 - 1)]
 _Pixels = Annotated[int, Meta(ge=1, le=4096)]
 _POSE_BYTES: Final = 7 * 4
 _SPHERE_BYTES: Final = 4 * 4
+_THREE_BYTES: Final = 3 * 4
+"""A vertex, and a triangle"""
 
 
 class VideoFrame(Message, frozen=True, tag="video"):
@@ -56,7 +61,7 @@ class VideoStep(Message, frozen=True, tag="step"):
 class Shape(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
     """One solid of a link or an object (the owner), in the owner's frame."""
 
-    owner: int
+    owner: _Index
     """Index into SceneShapes.links or .objects"""
     of_robot: bool
     kind: ShapeKind
@@ -70,6 +75,12 @@ class Shape(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=
     """(v, 3) float32: vertices of a mesh; empty for other kinds"""
     triangles: bytes = b""
     """(t, 3) uint32: vertex indices of a mesh's triangles; empty for other kinds"""
+
+    def __post_init__(self) -> None:
+        if not math.isfinite(sum(self.size_m) + sum(self.pose) + sum(self.color)):
+            raise ValueError("size_m, pose or color holds NaN or infinity; valid: finite numbers")
+        if self.kind == "mesh":
+            _require_mesh(self.vertices_m, self.triangles)
 
 
 class Eye(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
@@ -159,7 +170,7 @@ class SceneState(Message, frozen=True, tag="scene"):
     """Pose of the tool, whose z axis is the approach axis"""
     spheres: bytes
     """(m, 4) float32: centre and radius of the spheres of the gripper and of the held object"""
-    overlaps: tuple[tuple[int, float, float], ...]
+    overlaps: tuple[tuple[_Index, float, float], ...]
     """(object index, volume for L2, for R2): overlap of each object, in m³, with the gripper inflated by D_σ and moved
     by the robot side's δ, if any"""
     l2: EnlargementTerms
@@ -174,10 +185,24 @@ class SceneState(Message, frozen=True, tag="scene"):
             raise ValueError(
                 f"link_poses or spheres ends within a row; valid: whole rows of {_POSE_BYTES} and {_SPHERE_BYTES} bytes"
             )
-        if len(self.object_poses) != _POSE_BYTES * (len(self.object_index) // 4):
+        if 4 * len(self.object_poses) != _POSE_BYTES * len(self.object_index):
             raise ValueError(
                 f"object_poses has {len(self.object_poses)} bytes; valid: {_POSE_BYTES} for each entry of object_index"
             )
+
+
+def _require_mesh(vertices_m: bytes, triangles: bytes) -> None:
+    """Raise ValueError unless there are triangles, whole ones, of vertices that are there."""
+    if len(vertices_m) % _THREE_BYTES or len(triangles) % _THREE_BYTES or not triangles:
+        raise ValueError(
+            f"a mesh has {len(vertices_m)} and {len(triangles)} bytes of vertices and triangles; valid: {_THREE_BYTES}"
+            " for each, and one or more"
+        )
+    count, largest = len(vertices_m) // _THREE_BYTES, int(np.frombuffer(triangles, "<u4").max())
+    if largest >= count:
+        raise ValueError(f"triangles names the vertex {largest}; valid: 0 to {count - 1}")
+    if not np.isfinite(np.frombuffer(vertices_m, "<f4")).all():
+        raise ValueError("vertices_m holds NaN or infinity; valid: finite positions")
 
 
 AnyViewMessage = VideoFrame | VideoStep | SceneShapes | SceneState

@@ -18,6 +18,7 @@ import socket
 import struct
 import sys
 import threading
+from itertools import islice
 from pathlib import Path
 from typing import Any, Final
 
@@ -195,14 +196,14 @@ class _Process:
         listed = sorted(state.overlaps, key=lambda row: -max(row[1], row[2]))[:_MOST_LISTED]
         known = {index for index, _, _ in listed}
         targets = (index for index, role in enumerate(state.roles) if role == ROLES.index(Role.TARGET))
-        listed += [(index, 0.0, 0.0) for index in targets if index not in known]
+        listed += [(index, 0.0, 0.0) for index in islice(targets, _MOST_LISTED) if index not in known]
         scene = {
             "kind": ShownKind.SCENE,
             "overlap_mm3": (1e9 * total_l2, 1e9 * total_r2),
             "objects": [
                 {
                     "name": names[index] if index < len(names) else f"object {index}",
-                    "role": (ROLES[state.roles[index]] if index < len(state.roles) else Role.OBSTACLE).value,
+                    "role": _role(state, index).value,
                     "overlap_mm3": (1e9 * by_l2, 1e9 * by_r2),
                 }
                 for index, by_l2, by_r2 in listed
@@ -214,6 +215,11 @@ class _Process:
             **self._cues.of(state),
         }
         self._pages.show(ShownKind.SCENE, msgspec.json.encode(scene).decode())
+
+
+def _role(state: SceneState, index: int) -> Role:
+    """Return the role of an object; the last one for a number that is none."""
+    return ROLES[min(state.roles[index], len(ROLES) - 1)] if index < len(state.roles) else Role.OBSTACLE
 
 
 def said(facts: OperatorFacts) -> dict[str, Any]:

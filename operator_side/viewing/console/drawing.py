@@ -30,6 +30,9 @@ _LIGHT_FROM: Final = (0.4, -1.0, 1.5)
 _FIELD_OF_VIEW: Final = 0.9
 """First camera's vertical angle of view, in radians"""
 _STILL: Final = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
+_KINDS_OF_OWN_MESHES: Final = ("mesh", "capsule")
+_MOST_MESHES: Final = 2000
+"""Maximum number of meshes from which on capsules and meshes are no longer drawn: each takes milliseconds"""
 _GONE: Final = 1e-6
 """Scale that makes a shape invisible"""
 
@@ -150,7 +153,8 @@ class Drawing:
         self._objects = np.tile(np.array(_STILL), (len(shapes.objects), 1))
         alike: dict[Any, tuple[Solid, list[tuple[Shape, Any]]]] = {}
         for shape in shapes.shapes:
-            if shape.owner < len(shapes.links if shape.of_robot else shapes.objects):
+            own = shape.kind in _KINDS_OF_OWN_MESHES and len(alike) >= _MOST_MESHES
+            if shape.owner < len(shapes.links if shape.of_robot else shapes.objects) and not own:
                 key, solid, scale = solid_of(shape)
                 alike.setdefault(key, (solid, []))[1].append((shape, scale))
         self._batches = [

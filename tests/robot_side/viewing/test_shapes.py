@@ -157,7 +157,9 @@ def test_a_robots_mesh_without_room_becomes_a_box_around_it() -> None:
     turned = Rotation.random(random_state=2)
     w, x, y, z = turned.as_quat(scalar_first=True).tolist()
     pose = (0.1, 0.2, 0.3, w, x, y, z)
-    shape = Shape(0, True, "mesh", (1.0, 1.0, 1.0), pose, vertices_m=vertices_m.astype("<f4").tobytes())
+    shape = Shape(
+        0, True, "mesh", (1.0, 1.0, 1.0), pose, vertices_m=vertices_m.astype("<f4").tobytes(), triangles=bytes(12)
+    )
     box = scene_view._boxed(shape)
     assert box.kind == "box"
     position_m, rotation = placed(box, np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]))
