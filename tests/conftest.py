@@ -16,7 +16,8 @@ settings.load_profile("here")
 
 single_threaded_algebra()
 
-STARTS = {"subprocess.Popen", "os.fork", "os.posix_spawn"}
+STARTS = {"subprocess.Popen", "os.posix_spawn"}
+"""Events of Python; a fork is allowed, as each model that a test brings is tried in one"""
 FONTS = "fc-list"
 """Program that matplotlib runs once on each machine, before its first figure; any test may start it"""
 unmarked: list[str] = []

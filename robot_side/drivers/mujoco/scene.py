@@ -16,6 +16,7 @@ from common.files.input_file import require_input_file
 from common.roles import Role
 from robot_side.arm.port import ArmState
 from robot_side.drivers.mujoco.brought.table import TABLE_PREFIX, attach, keep_from_slipping, settle, usual_table_pose
+from robot_side.drivers.mujoco.brought.trial import hearing_signals, try_model, unusable
 from robot_side.drivers.mujoco.built_in_scenes import SceneName, furnish
 from robot_side.drivers.mujoco.hand.gripper_servos import serve_gripper
 from robot_side.drivers.mujoco.model_enums import GeomKind
@@ -109,6 +110,24 @@ def load_scene(
     if model_path is None and site_axis != "z":
         raise ConfigurationError(f"--site-axis {site_axis} is given without --model; valid: with --model")
     mujoco.set_mju_user_warning(_log_warning)
+    if model_path is None:
+        return _load(None, site, roles or {}, name, seed, site_axis)
+    try:
+        require_input_file("--model", model_path, "an MJCF file")
+    except ValueError as error:
+        raise ConfigurationError(str(error)) from None
+    try_model(model_path.resolve())
+    return hearing_signals(lambda: _load(model_path, site, roles or {}, name, seed, site_axis))
+
+
+def _load(
+    model_path: Path | None,
+    site: str | None,
+    roles: Mapping[str, Role],
+    name: SceneName,
+    seed: int,
+    site_axis: SiteAxis,
+) -> Scene:
     with warnings.catch_warnings(record=True) as said:
         warnings.simplefilter("always")
         if model_path is None:
@@ -165,7 +184,7 @@ def load_scene(
         data=data,
         robot=robot,
         objects=objects,
-        roles=assign_roles([thing.name for thing in objects], roles or {}),
+        roles=assign_roles([thing.name for thing in objects], roles),
         primitives=ObjectPrimitives(model, objects),
         start_pose=start_pose,
         shared_names=shared_names,
@@ -194,20 +213,16 @@ def _log_warning(message: str) -> None:
 
 def _read(model_path: Path) -> Any:
     try:
-        require_input_file("--model", model_path, "an MJCF file")
-    except ValueError as error:
-        raise ConfigurationError(str(error)) from None
-    try:
         return mujoco.MjSpec.from_file(str(model_path))
     except (ValueError, mujoco.FatalError) as error:
-        raise _unusable(error) from error
+        raise unusable(error) from error
 
 
 def _compile(spec: Any) -> Any:
     try:
         return spec.compile()
     except (ValueError, mujoco.FatalError) as error:
-        raise _unusable(error) from error
+        raise unusable(error) from error
 
 
 def _with_robot(spec: Any, site: str | None) -> tuple[Any, RobotModel]:
@@ -215,10 +230,6 @@ def _with_robot(spec: Any, site: str | None) -> tuple[Any, RobotModel]:
     model = _compile(spec)
     robot = find_robot(model, site)
     return (_compile(spec) if serve_gripper(spec, model, robot) else model), robot
-
-
-def _unusable(error: Exception) -> ConfigurationError:
-    return ConfigurationError(f"model: {' '.join(str(error).split())}; valid: an MJCF file that MuJoCo compiles")
 
 
 def _start_key(model: Any) -> int | None:
