@@ -15,6 +15,10 @@ from common.recording.mcap_chunk import COMPRESSIONS, records_of
 _MAGIC: Final = b"\x89MCAP0\r\n"
 _PART_BYTES: Final = 1 << 20
 """Length from which a part outside of chunks ends"""
+_LARGEST_CHUNK: Final = 1 << 27
+"""Most bytes of a chunk after unpacking; a second of ours has fewer than a tenth"""
+_MOST_TIMES: Final = 200
+"""How many times more bytes than the file, and one such chunk, all chunks together may have after unpacking"""
 
 
 class Part(NamedTuple):
@@ -41,6 +45,7 @@ class Scan:
     whole: bool = False
     """Whether the file was finished"""
     damaged: bool = False
+    _unpacked_bytes: int = 0
     _unchecked: bool = False
     """Whether there are messages that no chunk's checksum covers"""
 
@@ -75,6 +80,8 @@ class Scan:
         chunk = isinstance(record, Chunk)
         if chunk and record.compression not in COMPRESSIONS:
             self._refuse(f"is compressed by {record.compression!r}", "zstd, lz4 or none")
+        if chunk:
+            self._refuse_bomb(record.uncompressed_size)
         stamps = []
         for one in _inside(record):
             if isinstance(one, Channel) and self.names.setdefault(one.id, one.topic) != one.topic:
@@ -89,6 +96,13 @@ class Scan:
         if stamps:
             self._unchecked |= not (chunk and record.uncompressed_crc)
             self._add(Part(min(stamps), begin, end), joins=not chunk)
+
+    def _refuse_bomb(self, size: int) -> None:
+        self._unpacked_bytes += size
+        if size > _LARGEST_CHUNK:
+            self._refuse(f"has a chunk of {size} bytes after unpacking", f"at most {_LARGEST_CHUNK}")
+        if self._unpacked_bytes > _MOST_TIMES * self.path.stat().st_size + _LARGEST_CHUNK:
+            self._refuse(f"unpacks to more than {_MOST_TIMES} times its size", "a file that --record made")
 
     def _add(self, part: Part, *, joins: bool) -> None:
         """Add a part. joins: whether it may continue the one before it."""

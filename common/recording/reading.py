@@ -20,6 +20,8 @@ from common.recording.wire import FORMAT, PROFILE
 _SIDES: Final = {f"{PROFILE}.{side}": side for side in ("robot", "operator")}
 _HOUR_NS: Final = 3_600_000_000_000
 _LONGEST_NS: Final = 24 * _HOUR_NS
+_MOST_WAITING_BYTES: Final = 1 << 30
+"""Most bytes of messages that are kept until older ones, which stand later in the file, have come"""
 
 
 class Message(NamedTuple):
@@ -68,15 +70,22 @@ class Recording:
         At equal times they come in the order of their topics' names, and within a topic as they were written.
         """
         waiting: list[tuple[int, str, int, int, bytes]] = []
-        number = count()
+        number, held = count(), 0
         with self.path.open("rb") as file:
             for part in self._parts:
                 while waiting and waiting[0][0] < part.start_ns:
+                    held -= len(waiting[0][-1])
                     yield _first(waiting)
                 for one in messages_in(file, part):
                     topic = self._names[one.channel_id]
                     if not topics or topic in topics:
                         heappush(waiting, (one.log_time, topic, one.sequence, next(number), one.data))
+                        held += len(one.data)
+                        if held > _MOST_WAITING_BYTES:
+                            raise ConfigurationError(
+                                f"{self.path}: has more than {_MOST_WAITING_BYTES} bytes of messages out of order;"
+                                " valid: a file in order of time (mcap sort)"
+                            )
         while waiting:
             yield _first(waiting)
 
@@ -144,5 +153,5 @@ def _header(path: Path, values: Mapping[str, str]) -> dict[str, Any]:
 def _value(text: str) -> Any:
     try:
         return json.loads(text)
-    except json.JSONDecodeError:
+    except (ValueError, RecursionError):  # also numbers of thousands of digits, and thousands of brackets
         return text

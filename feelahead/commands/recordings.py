@@ -90,7 +90,16 @@ def _recording(path: Path | None) -> Iterator[Recording]:
         yield recording
     except (FeelaheadError, OSError):
         raise
-    except (ArithmeticError, AttributeError, LookupError, MemoryError, TypeError, ValueError, struct.error) as error:
+    except (
+        ArithmeticError,
+        AttributeError,
+        LookupError,
+        MemoryError,
+        RecursionError,
+        TypeError,
+        ValueError,
+        struct.error,
+    ) as error:
         what = f"{type(error).__name__}: {error}".splitlines()[0]
         raise ConfigurationError(
             f"{path}: is no valid recording ({what:.200}); valid: a file that --record made"

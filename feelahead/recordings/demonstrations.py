@@ -14,7 +14,7 @@ from common.protocol.view_messages import VIEW_NAMES, VideoFrame
 from common.recording.decoding import view_message
 from common.recording.images import read_image
 from common.recording.reading import Recording
-from feelahead.recordings.tables import Table, Tables
+from feelahead.recordings.tables import Joined, Table, Tables
 
 MOST_HZ: Final = 30
 """Highest rate that is chosen without --fps, and the rate without pictures"""
@@ -116,7 +116,7 @@ def read_demonstrations(recording: Recording, tables: Tables, rate_hz: int | Non
     return Demonstrations(rate_hz, times_s, vectors, shown, kept, left_out)
 
 
-def _cut(marks: Table, times_s: list[float], first: int) -> tuple[list[Episode], int]:
+def _cut(marks: Table, times_s: FloatArray, first: int) -> tuple[list[Episode], int]:
     """Return the episodes by their marks, and the number of those left out; one of all rows if none was started.
 
     An episode ends with its result, or else with the next start, reset, or the recording. first: first row that counts.
@@ -177,7 +177,7 @@ def _median_rate_hz(seen: Mapping[str, list[Picture]]) -> int:
     return MOST_HZ if least_s <= 1.0 / MOST_HZ else max(1, round(1.0 / least_s))
 
 
-def _vectors(joined: Table) -> dict[str, dict[str, str]]:
+def _vectors(joined: Joined) -> dict[str, dict[str, str]]:
     """Return for each feature of the dataset its parts, and the joined table's column for each part."""
     joints = [column for column in joined.columns() if column.startswith("arm.position_rad.")]
     if not joints or "command.r2" not in joined.columns():
@@ -204,7 +204,9 @@ def _vectors(joined: Table) -> dict[str, dict[str, str]]:
     return vectors
 
 
-def _first_whole_row(vectors: Mapping[str, Mapping[str, str]], seen: Mapping[str, list[Picture]], joined: Table) -> int:
+def _first_whole_row(
+    vectors: Mapping[str, Mapping[str, str]], seen: Mapping[str, list[Picture]], joined: Joined
+) -> int:
     """Return the first row from which every required column has a value and every camera a picture."""
     needed = [*vectors["observation.state"].values(), *vectors["action"].values()]
     if "observation.stiffness" in vectors:

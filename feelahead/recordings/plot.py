@@ -10,7 +10,7 @@ import numpy as np
 
 from common.arrays import FloatArray
 from common.recording.reading import Recording
-from feelahead.recordings.tables import Table, Tables
+from feelahead.recordings.tables import Joined, Tables
 
 PLOT_HZ: Final = 100.0
 _INCHES: Final = (8.27, 11.69)
@@ -37,7 +37,7 @@ def plot_run(recording: Recording, tables: Tables, out: Path) -> None:
 
     joined = tables.joined(PLOT_HZ)
     times_s = np.array(joined.times_s)
-    panels: list[Callable[[Any, Any, Table, FloatArray], None]] = [_onsets, _felt("r2", "R2"), _felt("l2", "L2")]
+    panels: list[Callable[[Any, Any, Joined, FloatArray], None]] = [_onsets, _felt("r2", "R2"), _felt("l2", "L2")]
     panels += [_speed, _enlargement, _distances, _delays]
     with mpl.rc_context(_STYLE):
         layout: Any = {"figsize": _INCHES, "height_ratios": _HEIGHTS, "layout": "constrained"}
@@ -73,9 +73,11 @@ def _title(recording: Recording, tables: Tables) -> str:
     return "\n".join(lines)
 
 
-def _bands(axis: Any, joined: Table, times_s: FloatArray) -> None:
+def _bands(axis: Any, joined: Joined, times_s: FloatArray) -> None:
     """Draw the robot side's states (armed, stopped, disarmed) as coloured bands in the background."""
-    states = [row.get("stiffness.state") or row.get("telemetry.state") for row in joined.rows]
+    states = [
+        one or other for one, other in zip(*map(joined.values, ("stiffness.state", "telemetry.state")), strict=True)
+    ]
     begins = [0, *(i for i in range(1, len(states)) if states[i] != states[i - 1]), len(states)]
     for start, end in pairwise(begins):
         if start < len(states) and states[start] in _STATES:
@@ -83,7 +85,7 @@ def _bands(axis: Any, joined: Table, times_s: FloatArray) -> None:
             axis.axvspan(times_s[start], last_s, color=_STATES[str(states[start])], lw=0, zorder=0)
 
 
-def _onsets(_: Any, axis: Any, joined: Table, times_s: FloatArray) -> None:
+def _onsets(_: Any, axis: Any, joined: Joined, times_s: FloatArray) -> None:
     horizon_mm = 1e3 * joined.numbers("stiffness.horizon_m")
     for side, label, color in _SIDES:
         ways = np.stack([1e3 * joined.numbers(f"stiffness.{side}.fast_m.{k}") for k in range(8)])
@@ -96,8 +98,8 @@ def _onsets(_: Any, axis: Any, joined: Table, times_s: FloatArray) -> None:
     axis.set(ylabel="distance (mm)", title="Onset distances of the strengths; nothing drawn beyond the horizon")
 
 
-def _felt(side: str, name: str) -> Callable[[Any, Any, Table, FloatArray], None]:
-    def draw(figure: Any, axis: Any, joined: Table, times_s: FloatArray) -> None:
+def _felt(side: str, name: str) -> Callable[[Any, Any, Joined, FloatArray], None]:
+    def draw(figure: Any, axis: Any, joined: Joined, times_s: FloatArray) -> None:
         zones = np.stack([joined.numbers(f"felt.{side}.{zone}") for zone in range(10)])
         end_s = times_s[-1] if len(times_s) else 1.0
         look: Any = {"cmap": "viridis_r", "vmin": 0.0, "vmax": _FULL, "interpolation": "nearest", "zorder": 1}
@@ -115,7 +117,7 @@ def _felt(side: str, name: str) -> Callable[[Any, Any, Table, FloatArray], None]
     return draw
 
 
-def _curves(axis: Any, joined: Table, times_s: FloatArray, *curves: tuple[str, float, str, str]) -> None:
+def _curves(axis: Any, joined: Joined, times_s: FloatArray, *curves: tuple[str, float, str, str]) -> None:
     """Draw columns of the table as curves; missing columns are left out.
 
     curves: (column, factor on its values, colour, label) of each.
@@ -126,14 +128,14 @@ def _curves(axis: Any, joined: Table, times_s: FloatArray, *curves: tuple[str, f
             axis.plot(times_s, values, color=color, lw=0.8, ls="--" if label == "commanded" else "-", label=label)
 
 
-def _speed(_: Any, axis: Any, joined: Table, times_s: FloatArray) -> None:
+def _speed(_: Any, axis: Any, joined: Joined, times_s: FloatArray) -> None:
     measured = ("stiffness.speed_m_s", 1e3, _ORANGE, "measured")
     _curves(axis, joined, times_s, measured, ("stiffness.commanded_m_s", 1e3, _GREY, "commanded"))
     axis.axhline(0.0, color=_GREY, lw=0.5)
     axis.set(ylabel="speed (mm/s)", title="Speed along the approach")
 
 
-def _enlargement(_: Any, axis: Any, joined: Table, times_s: FloatArray) -> None:
+def _enlargement(_: Any, axis: Any, joined: Joined, times_s: FloatArray) -> None:
     _curves(
         axis,
         joined,
@@ -158,14 +160,14 @@ def _enlargement(_: Any, axis: Any, joined: Table, times_s: FloatArray) -> None:
     other.legend([*handles, *more], [*labels, *names], loc="upper left", ncols=2)
 
 
-def _distances(_: Any, axis: Any, joined: Table, times_s: FloatArray) -> None:
+def _distances(_: Any, axis: Any, joined: Joined, times_s: FloatArray) -> None:
     nearest = ("robot_status.nearest_mm", 1.0, _BLUE, "nearest obstacle")
     _curves(axis, joined, times_s, nearest, ("robot_status.target_mm", 1.0, _GREEN, "target"))
     title = "Perceived distances of the unenlarged gripper"
     axis.set(ylabel="distance (mm)", ylim=(min(0.0, axis.get_ylim()[0]), None), title=title)
 
 
-def _delays(_: Any, axis: Any, joined: Table, times_s: FloatArray) -> None:
+def _delays(_: Any, axis: Any, joined: Joined, times_s: FloatArray) -> None:
     _curves(
         axis,
         joined,
@@ -176,7 +178,7 @@ def _delays(_: Any, axis: Any, joined: Table, times_s: FloatArray) -> None:
         ("robot_status.loop_age_ms", 1.0, "black", "loop age that the law assumes"),
     )
     # Scale by the armed time: the worst case, which is assumed at first, would make all else invisible.
-    armed = np.array([row.get("stiffness.state") == "armed" for row in joined.rows], dtype=bool)
+    armed = np.array([state == "armed" for state in joined.values("stiffness.state")], dtype=bool)
     settled = joined.numbers("robot_status.loop_age_ms")[armed]
     if np.isfinite(settled).any():
         axis.set_ylim(top=2.0 * float(np.nanmedian(settled)) + 10.0)

@@ -14,7 +14,7 @@ import msgspec
 import numpy as np
 
 from common.arrays import FloatArray
-from common.errors import RemoteProtocolError
+from common.errors import ConfigurationError, RemoteProtocolError
 from common.recording.entries import Entry, Kind, unpack_block
 from common.recording.reading import Recording
 from feelahead.recordings.controller import read_value
@@ -25,6 +25,10 @@ from robot_side.recording.arm_states import unpack_state
 JOINED_HZ: Final = 100.0
 _NANOSECONDS: Final = 1e-9
 _NO_ZONES: Final = (0.0,) * 10
+_MOST_COLUMNS: Final = 5000
+_ROWS_OF_NOTHING: Final = 100_000
+_ROWS_A_MESSAGE: Final = 100
+"""Rows of a joined table that may come without any message, and for each message"""
 _STAMPS: Final = ("time_s", "now_s", "sent_s", "sequence", "side")
 """Columns that the joined table leaves out."""
 _TOPICS: Final = (
@@ -45,30 +49,61 @@ class Table:
     times_s: list[float] = field(default_factory=list)
     """Time of each row since the recording began"""
     rows: list[dict[str, Any]] = field(default_factory=list)
+    _columns: dict[str, None] = field(default_factory=dict)
 
     def add(self, time_s: float, row: dict[str, Any]) -> None:
-        """Append a row."""
+        """Append a row; ConfigurationError if the table would have too many columns."""
         self.times_s.append(time_s)
         self.rows.append(row)
+        if not self._columns.keys() >= row.keys():
+            self._columns |= dict.fromkeys(row)
+            if len(self._columns) > _MOST_COLUMNS:
+                raise ConfigurationError(f"a topic has {len(self._columns)} columns; valid: at most {_MOST_COLUMNS}")
 
     def columns(self) -> list[str]:
         """Return the names of all rows' columns, in order of first use."""
-        return list(dict.fromkeys(name for row in self.rows for name in row))
+        return list(self._columns)
+
+    def values(self, name: str) -> Iterator[Any]:
+        """Yield a column, None for missing values."""
+        return (row.get(name) for row in self.rows)
 
     def numbers(self, name: str) -> FloatArray:
         """Return a column as numbers; NaN for missing values and texts."""
-        values = [row.get(name) for row in self.rows]
-        return np.array([value if isinstance(value, int | float) else np.nan for value in values], dtype=np.float64)
+        return _numbers(self.values(name), len(self.rows))
 
     def sorted(self) -> "Table":
         """Return the table sorted by time; messages of the two sides are recorded slightly out of order."""
         order = np.argsort(np.array(self.times_s), kind="stable")
-        return Table([self.times_s[i] for i in order], [self.rows[i] for i in order])
+        return Table([self.times_s[i] for i in order], [self.rows[i] for i in order], self._columns)
 
-    def before(self, times_s: FloatArray) -> list[dict[str, Any]]:
-        """Return for each time the newest row until then; an empty one before the first row."""
-        found = np.searchsorted(np.array(self.times_s), times_s + 1e-9, side="right") - 1
-        return [self.rows[index] if index >= 0 else {} for index in found]
+
+@dataclass(frozen=True)
+class Joined:
+    """Table at an even rate, made from others column by column, as it is much larger than they are."""
+
+    times_s: FloatArray
+    _sources: Mapping[str, tuple[Table, str, list[int]]]
+    """For each column its table, its name there, and the newest row at each time; -1 before the first one"""
+
+    def columns(self) -> list[str]:
+        """Return the columns' names."""
+        return list(self._sources)
+
+    def values(self, name: str) -> Iterator[Any]:
+        """Yield a column, None for missing values and for an unknown column."""
+        if name not in self._sources:
+            return iter([None] * len(self.times_s))
+        table, column, newest = self._sources[name]
+        return (table.rows[row].get(column) if row >= 0 else None for row in newest)
+
+    def numbers(self, name: str) -> FloatArray:
+        """Return a column as numbers; NaN for missing values and texts."""
+        return _numbers(self.values(name), len(self.times_s))
+
+
+def _numbers(values: Iterator[Any], count: int) -> FloatArray:
+    return np.fromiter((value if isinstance(value, int | float) else np.nan for value in values), np.float64, count)
 
 
 @dataclass
@@ -84,19 +119,25 @@ class Tables:
         """Return the table of that name; an empty table if there is none."""
         return self.by_name.get(name) or Table()
 
-    def joined(self, rate_hz: float = JOINED_HZ) -> Table:
-        """Return one table at an even rate, whose rows have the newest value of every column at their time."""
+    def joined(self, rate_hz: float = JOINED_HZ) -> Joined:
+        """Return one table at an even rate, whose rows have the newest value of every column at their time.
+
+        ConfigurationError if it would have far more rows than there are messages, as by a stamp that is wrong.
+        """
+        rows, messages = self.duration_s * rate_hz, sum(len(table.rows) for table in self.by_name.values())
+        if rows > _ROWS_OF_NOTHING + _ROWS_A_MESSAGE * messages:
+            raise ConfigurationError(
+                f"spans {self.duration_s:.0f} s with {messages} messages; valid: a message or more for each"
+                f" {_ROWS_A_MESSAGE} rows of {1e3 / rate_hz:g} ms"
+            )
         times_s = np.arange(0.0, self.duration_s, 1.0 / rate_hz)
-        rows: list[dict[str, Any]] = [{} for _ in times_s]
+        sources: dict[str, tuple[Table, str, list[int]]] = {}
         for name in _JOINED:
-            table = self.by_name.get(name)
-            if table is None:
-                continue
-            blank = dict.fromkeys(f"{name}.{column}" for column in table.columns() if column not in _STAMPS)
-            for row, found in zip(rows, table.before(times_s), strict=True):
-                row.update(blank)
-                row.update((f"{name}.{column}", value) for column, value in found.items() if column not in _STAMPS)
-        return Table(times_s.tolist(), rows)
+            table = self.table(name)
+            newest = (np.searchsorted(np.array(table.times_s), times_s + 1e-9, side="right") - 1).tolist()
+            shown = (column for column in table.columns() if column not in _STAMPS)
+            sources |= {f"{name}.{column}": (table, column, newest) for column in shown}
+        return Joined(times_s, sources)
 
 
 def read_tables(recording: Recording) -> Tables:
@@ -179,8 +220,7 @@ def export_csv(tables: Tables, folder: Path) -> list[str]:
         with (folder / f"{name}.csv").open("w", newline="", encoding="utf-8") as file:
             writer = csv.writer(file)
             writer.writerow(["recording_s", *columns])
-            for time_s, row in zip(table.times_s, table.rows, strict=True):
-                values = (row.get(column) for column in columns)
+            for time_s, *values in zip(table.times_s, *map(table.values, columns), strict=True):
                 numbers = (int(value) if isinstance(value, bool) else value for value in values)
                 writer.writerow([f"{time_s:.9f}", *numbers])
         written.append(f"{name}.csv")
@@ -195,13 +235,13 @@ def export_parquet(tables: Tables, folder: Path) -> list[str]:
     written = []
     for name, table in _all(tables):
         columns: dict[str, Any] = {"recording_s": table.times_s}
-        columns |= {column: _one_kind([row.get(column) for row in table.rows]) for column in table.columns()}
+        columns |= {column: pyarrow.array(_one_kind(list(table.values(column)))) for column in table.columns()}
         parquet.write_table(pyarrow.table(columns), folder / f"{name}.parquet", compression="zstd")
         written.append(f"{name}.parquet")
     return written
 
 
-def _all(tables: Tables) -> list[tuple[str, Table]]:
+def _all(tables: Tables) -> list[tuple[str, Table | Joined]]:
     return [*tables.by_name.items(), (JOINED, tables.joined())]
 
 

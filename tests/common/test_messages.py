@@ -43,7 +43,7 @@ HEADER = Header(epoch=1, sequence=2, sent_s=3.0)
 FULL = Header(2**53 - 1, 10_000_000, 1e6 / 3.0, 1e5 / 3.0, 0.02 / 3.0, 1e5 / 7.0, 0.01 / 3.0)
 POSE = (0.1, 0.2, 0.3, 1.0, 0.0, 0.0, 0.0)
 ROW = struct.pack("<7f", *POSE)
-SHAPE = Shape(0, False, "mesh", (1.0, 1.0, 1.0), POSE, vertices_m=b"\x00" * 12, triangles=b"\x01" * 12)
+SHAPE = Shape(0, False, "mesh", (1.0, 1.0, 1.0), POSE, vertices_m=b"\x00" * 12, triangles=bytes(12))
 SCENE = msgspec.structs.replace(scene_state(HEADER), roles=bytes([0, 1]), spheres=bytes(16))
 VIEWS: tuple[AnyViewMessage, ...] = (
     VideoFrame(HEADER, view="overview", captured_s=3.0, width=640, height=480, jpeg=bytes(range(256)) * 100),

@@ -1,11 +1,17 @@
 import io
+import struct
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
+import zstandard
+from hypothesis import given
+from hypothesis import strategies as st
+from mcap.opcode import Opcode
 from mcap.writer import Writer
 
+from common.errors import ConfigurationError
 from common.recording.content import Content
 from common.recording.entries import Kind, entry, pack_block
 from common.recording.mcap_file import RecordingFile
@@ -136,6 +142,17 @@ def no_channel(recorded: Path) -> bytes:
     return content[:begin] + b"\x80" + content[begin + 1 :]
 
 
+def with_bombs(recorded: Path, bytes_each: int, count: int) -> bytes:
+    """Put chunks of zeros before the first one; each is one record of a kind that readers pass over."""
+    packed = zstandard.compress(struct.pack("<BQ", 0x7F, bytes_each - 9) + bytes(bytes_each - 9))
+    body = struct.pack("<QQQI", 0, 0, bytes_each, 0) + struct.pack("<I4sQ", 4, b"zstd", len(packed)) + packed
+    content = recorded.read_bytes()
+    place = 8
+    while content[place] != Opcode.CHUNK:
+        place += 9 + int.from_bytes(content[place + 1 : place + 9], "little")
+    return content[:place] + count * (struct.pack("<BQ", Opcode.CHUNK, len(body)) + body) + content[place:]
+
+
 REFUSED: dict[str, tuple[Callable[[Path], bytes], str]] = {
     "empty": (lambda _: b"", "is empty"),
     "no MCAP": (lambda recorded: b"PK" + recorded.read_bytes(), "is no MCAP file"),
@@ -156,6 +173,14 @@ REFUSED: dict[str, tuple[Callable[[Path], bytes], str]] = {
     "compressed otherwise": (other_compression, "is compressed by 'br!'; valid: zstd, lz4 or none"),
     "damaged, without chunks": (unchunked_and_flipped, "its checksum"),
     "a channel that is not described": (no_channel, "which nothing before them describes"),
+    "a chunk that unpacks to gigabytes": (
+        lambda recorded: with_bombs(recorded, bytes_each=(1 << 27) + 1, count=1),
+        "has a chunk of 134217729 bytes after unpacking; valid: at most 134217728",
+    ),
+    "many chunks that unpack to gigabytes": (
+        lambda recorded: with_bombs(recorded, bytes_each=1 << 25, count=30),
+        "unpacks to more than 200 times its size",
+    ),
     "a channel of two topics": (two_topics, "has two topics in channel"),
 }
 
@@ -169,3 +194,23 @@ def test_what_cannot_be_read_is_refused_with_the_reason(recorded: Path, tmp_path
     assert said.startswith(f"{path}: ")
     assert told in said
     assert "; valid: " in said
+
+
+@given(
+    records=st.lists(st.tuples(st.integers(0, 15), st.binary(max_size=80)), max_size=6),
+    place=st.integers(0, 600),
+    flipped=st.binary(),
+)
+def test_any_bytes_are_read_or_refused_in_one_line(
+    records: list[tuple[int, bytes]], place: int, flipped: bytes, recorded: Path, tmp_path_factory: Any
+) -> None:
+    whole = recorded.read_bytes()
+    place = min(8 + place, len(whole))
+    odd = b"".join(struct.pack("<BQ", kind, len(body)) + body for kind, body in records)
+    path = tmp_path_factory.getbasetemp() / "any.mcap"
+    for content in (whole[:8] + odd + whole[8:], whole[:place] + flipped + whole[place + len(flipped) :]):
+        path.write_bytes(content)
+        try:
+            list(open_recording(path).messages())
+        except ConfigurationError as error:
+            assert "\n" not in str(error)  # noqa: PT017  # of any content

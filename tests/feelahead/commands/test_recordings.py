@@ -1,7 +1,7 @@
 """Commands on recordings: bad input is reported in one line, and a recorded demo is replayed to the same bits."""
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import pytest
@@ -12,7 +12,7 @@ from common.recording.content import Content
 from common.recording.mcap_file import RecordingFile
 from common.recording.reading import open_recording
 from common.recording.topics import FACTS_TOPIC, TYPES
-from common.recording.wire import HEADER, NOTE, as_json, stamped
+from common.recording.wire import FORMAT, HEADER, NOTE, as_json, stamped
 from feelahead.commands.demo.command import demo
 from feelahead.commands.recordings import export, plot, replay
 from feelahead.recordings.replay_operator import replay_operator
@@ -43,6 +43,41 @@ def test_wrong_content_in_a_right_file_is_one_line(tmp_path: Path) -> None:
     file.close()
     for command in COMMANDS[1:]:
         assert "odd.mcap: " in refusal(command, [str(path), "--out", str(tmp_path / f"{command.__name__}.png")])
+
+
+DEEP = b'{"a":' * 50_000 + b"1" + b"}" * 50_000
+WIDE = as_json({f"c{number}": 1.0 for number in range(5001)})
+
+
+@pytest.mark.parametrize(
+    ("messages", "told"),
+    [
+        ({0.0: DEEP}, "odd.mcap: is no valid recording (RecursionError"),
+        ({0.0: WIDE}, "a topic has 5001 columns; valid: at most 5000"),
+        ({0.0: b"{}", 80_000.0: b"{}"}, "spans 80000 s with 2 messages; valid: a message or more for each 100 rows"),
+    ],
+)
+def test_a_small_recording_of_a_large_table_is_refused(
+    tmp_path: Path, messages: Mapping[float, bytes], told: str
+) -> None:
+    path = tmp_path / "odd.mcap"
+    file = RecordingFile(path, 0.0)
+    Content(file).write(0, HEADER + as_json({"side": "robot", "settings": {}}))
+    for now_s, content in messages.items():
+        file.write("/stiffness", now_s, content)
+    file.close()
+    for command in COMMANDS[1:]:
+        assert told in refusal(command, [str(path), "--out", str(tmp_path / f"{command.__name__}.png")])
+
+
+@pytest.mark.parametrize("text", ["[" * 100_000, "1" * 5_000])
+def test_a_header_that_is_no_json_is_a_text(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "odd.mcap"
+    file = RecordingFile(path, 0.0)
+    file.describe("feelahead.robot", {"format": str(FORMAT), "settings": text})
+    file.write("/stiffness", 0.0, b"{}")
+    file.close()
+    assert open_recording(path).headers["robot"]["settings"] == text
 
 
 def test_a_recording_with_nothing_for_a_command_is_refused(tmp_path: Path) -> None:

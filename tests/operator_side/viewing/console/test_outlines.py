@@ -40,7 +40,7 @@ def test_the_nearer_face_is_the_outline_of_what_is_straight_ahead(
 
 def test_right_is_by_the_eye_and_the_tools_pose_counts() -> None:
     """The eye looks along z with y up, so its right is -x; the tool is moved, and the mesh with it."""
-    mesh = Shape(0, False, "mesh", (1.0, 1.0, 1.0), STILL, vertices_m=TETRAHEDRON.tobytes())
+    mesh = Shape(0, False, "mesh", (1.0, 1.0, 1.0), STILL, vertices_m=TETRAHEDRON.tobytes(), triangles=bytes(12))
     box = outline(at(0.8, mesh, 5.5), np.array((5.0, 0.0, 0.0, *STILL[3:])), EYE)
     assert box == pytest.approx((-0.6, 0.0, -0.4 / 1.2, 0.3))
 
