@@ -18,7 +18,7 @@ _PART_BYTES: Final = 1 << 20
 _LARGEST_CHUNK: Final = 1 << 27
 """Most bytes of a chunk after unpacking; a second of ours has fewer than a tenth"""
 _MOST_TIMES: Final = 200
-"""How many times more bytes than the file, and one such chunk, all chunks together may have after unpacking"""
+"""Most bytes of all chunks after unpacking, in sizes of the file; one such chunk is free"""
 
 
 class Part(NamedTuple):

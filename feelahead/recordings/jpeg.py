@@ -28,7 +28,7 @@ def decoded(jpeg: bytes) -> Any:
 def _opened(jpeg: bytes) -> Any:
     from PIL import Image  # noqa: PLC0415
 
-    # Unless it is told the format, Pillow tries all that it knows, and runs Ghostscript for one of them.
+    # Without a format Pillow tries all that it knows, and runs Ghostscript for one of them.
     image = Image.open(io.BytesIO(jpeg), formats=["JPEG"])
     if max(image.size) > _LARGEST:
         raise ValueError(f"it has {image.width} x {image.height} pixels")

@@ -28,7 +28,7 @@ _LONGEST: Final = 4096
 _UNUSABLE: Final = "model: {}; valid: an MJCF file that MuJoCo compiles"
 _TOO_LARGE: Final = "model: takes MuJoCo more than {} GB of memory, or makes it fail; valid: a smaller model"
 _WITHOUT_REASON: Final = "Caught an unknown exception"
-"""What MuJoCo says, for one, where C++ has no memory left"""
+"""Error of MuJoCo where C++ has no memory left, for one"""
 _TOO_SLOW: Final = "model: takes MuJoCo more than {} s of processor time; valid: a smaller model"
 
 
