@@ -31,6 +31,7 @@ TO_BE_TYPED = [README, "docs/two-machines.md", "docs/systemd/README.md"]
 DOCUMENTS = [
     README,
     "CONTRIBUTING.md",
+    "SECURITY.md",
     *(str(path.relative_to(ROOT)) for path in sorted((ROOT / "docs").rglob("*.md"))),
 ]
 COMMANDS = {
