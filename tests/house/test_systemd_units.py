@@ -61,6 +61,15 @@ def test_systemd_finds_nothing_wrong_and_little_left_open(name: str, tmp_path: P
     assert float(level[1]) <= EXPOSURE[name]
 
 
+@pytest.mark.parametrize("name", EXPOSURE)
+def test_a_unit_has_limits_and_never_gives_up(name: str) -> None:
+    text = (UNITS / f"{name}.service").read_text()
+    assert "\nStartLimitIntervalSec=0\n" in text
+    assert "\nRestart=on-failure\n" in text
+    for limit in ("MemoryMax", "TasksMax", "LimitNOFILE"):
+        assert re.search(rf"^{limit}=[1-9]\d*[MG]?$", text, re.MULTILINE), limit
+
+
 def command_line(name: str, **replaced: str) -> list[str]:
     """Return the words of a unit's ExecStart, split as systemd does.
 
