@@ -43,13 +43,17 @@ def running(compose: Compose) -> Engine:
 
 @pytest.mark.parametrize("service", SERVICES)
 def test_little_is_left_open(running: Engine, service: str) -> None:
-    """No port of the host is used, and a container has no more rights and programs than promised."""
+    """No port of the host is used, and a container has no more rights, programs and memory than promised."""
     known = running.inspect(running.container(service))
     host, ports = known["HostConfig"], known["NetworkSettings"]["Ports"] or {}
     assert not any(ports.values())
     assert [name.removeprefix("CAP_") for name in host["CapAdd"] or []] == ["NET_ADMIN"] * (service == "router")
     assert host["CapDrop"] == ["ALL"]
     assert host["ReadonlyRootfs"]
+    # What the kernel cannot limit, the engine leaves out.
+    known_limits = running.docker("info", "--format", "{{.MemoryLimit}} {{.PidsLimit}}").split()
+    for can, name, most in zip(known_limits, ("Memory", "PidsLimit"), (4 << 30, 256), strict=True):
+        assert can == "false" or 0 < host[name] <= most
     user = running.docker("exec", known["Id"], "id", "-u").strip()
     assert (user == "0") == (service == "router")
     assert not running.docker("exec", known["Id"], "sh", "-c", "command -v gcc cc g++ ld make || true").strip()
