@@ -16,6 +16,7 @@ from typing import Any, cast
 
 from common.errors import ConfigurationError, FeelaheadError
 from common.recording.packages import require_packages
+from feelahead.lab.scheduler import Scheduler
 
 _LOOK_S = 1.0
 _CONNECT_S = "10s"
@@ -45,8 +46,8 @@ def processes(workers: int) -> Iterator[Executor]:
 
 
 @contextmanager
-def cluster(address: str, own_file: str | None) -> Iterator[Executor]:
-    """Yield an executor on the workers of the dask scheduler at `address`; ConfigurationError if none answers there.
+def cluster(scheduler: Scheduler, own_file: str | None) -> Iterator[Executor]:
+    """Yield an executor on the workers of a dask scheduler; ConfigurationError if none answers there.
 
     own_file: file of a user's own question, which is sent to the workers; None for a question of feelahead.
     """
@@ -56,11 +57,20 @@ def cluster(address: str, own_file: str | None) -> Iterator[Executor]:
 
     for name in ("distributed", "distributed.client"):  # the import sets their levels; errors are raised below
         logging.getLogger(name).setLevel(logging.CRITICAL)
+    address, security = scheduler.address, None
+    if scheduler.key is not None:
+        security = distributed.Security(  # type: ignore[no-untyped-call]
+            require_encryption=True,
+            tls_ca_file=str(scheduler.authority),
+            tls_client_cert=str(scheduler.certificate),
+            tls_client_key=str(scheduler.key),
+        )
     try:
-        client: Any = distributed.Client(address, timeout=_CONNECT_S, set_as_default=False)  # type: ignore[no-untyped-call]
+        client: Any = distributed.Client(address, timeout=_CONNECT_S, set_as_default=False, security=security)  # type: ignore[no-untyped-call]
     except (OSError, ValueError, TypeError) as error:
         raise ConfigurationError(
-            f"--scheduler {address}: no dask scheduler answers there; valid: a running scheduler's address, such as tcp://127.0.0.1:8786"
+            f"--scheduler {address}: no dask scheduler {'with these certificates ' if security else ''}answers there; "
+            "valid: a running scheduler's address, such as tcp://127.0.0.1:8786"
         ) from error
     try:
         if own_file is not None:

@@ -15,6 +15,7 @@ import numpy as np
 from common.command.stop_signal import StopSignal
 from common.errors import ConfigurationError, FeelaheadError
 from feelahead.lab.executors import cluster, processes
+from feelahead.lab.scheduler import Scheduler
 from feelahead.lab.table import Row
 from feelahead.printing.progress import Shown
 
@@ -59,12 +60,14 @@ def results(
             shown.begin(str(piece))
             yield piece, run_piece(module, piece.cell, piece.seed)
         return
-    if settings.scheduler is None:
+    scheduler: Scheduler | None = settings.cluster()
+    if scheduler is None:
         question.prepare()
-    if settings.scheduler:
-        pool = cluster(settings.scheduler, _own_file(module))
-    else:
         pool = processes(settings.workers or _WORKERS)
+    else:
+        if (warning := scheduler.warning()) is not None:
+            sys.stderr.write(f"feelahead {question.name}: {warning}\n")
+        pool = cluster(scheduler, _own_file(module))
     left = list(todo)
     # A flag, as an exception that a signal's handler raises may be lost in a callback.
     with StopSignal() as stop, pool as executor:

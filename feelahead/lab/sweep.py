@@ -8,7 +8,6 @@ interruption.
 
 import functools
 import hashlib
-import re
 import sys
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
@@ -29,13 +28,13 @@ from feelahead.lab.figures import PICTURES
 from feelahead.lab.goals import Goal, show_goals
 from feelahead.lab.journal import Journal
 from feelahead.lab.pieces import Piece, results
+from feelahead.lab.scheduler import Scheduler
 from feelahead.lab.table import Row, Table
 from feelahead.printing.progress import progress
 
 _ROOT = Path(__file__).parents[2]
 _PACKAGES = ("common", "operator_side", "robot_side", "feelahead")
 _MOST_RUNS = 10_000_000
-_SCHEDULER = re.compile(r"[a-z]+://[^/:]+:\d{1,5}")
 _INTERRUPTED = 130
 """Exit code by which shells report that Ctrl-C has ended a command."""
 _WIDTH = 200
@@ -55,8 +54,15 @@ class Sweep:
     workers: Annotated[Annotated[int, Meta(ge=1)] | None, tyro.conf.arg(metavar="N")] = None
     """Number of cells that run at the same time, each in its own process on this machine; 2 unless given. With 1 the
     cells run one by one in this process."""
-    scheduler: Annotated[str | None, tyro.conf.arg(metavar="tcp://HOST:PORT")] = None
-    """Run the cells on the cluster of this dask.distributed scheduler, instead of on this machine."""
+    scheduler: Annotated[str | None, tyro.conf.arg(metavar="tls://HOST:PORT")] = None
+    """Run the cells on the cluster of this dask.distributed scheduler, instead of on this machine. With tcp:// anyone
+    who reaches the scheduler runs code on all its machines."""
+    tls_ca: Annotated[Path | None, tyro.conf.arg(metavar="FILE.pem")] = None
+    """Certificate of the cluster's own authority, for a scheduler at a tls:// address."""
+    tls_cert: Annotated[Path | None, tyro.conf.arg(metavar="FILE.pem")] = None
+    """Certificate of this machine, signed by that authority."""
+    tls_key: Annotated[Path | None, tyro.conf.arg(metavar="FILE.pem")] = None
+    """Secret key of this machine."""
     resume: Annotated[Path | None, tyro.conf.arg(metavar="FILE.jsonl")] = None
     """Write each finished cell to this file, and skip the cells that the file already has."""
     csv: Annotated[Path | None, tyro.conf.arg(metavar="FILE.csv")] = None
@@ -76,10 +82,13 @@ class Sweep:
             require_output_file(f"--{name}", getattr(self, name))
         require_output_file("--picture", self.picture, PICTURES)
         self._require_files_of_their_own()
-        if self.scheduler is not None and not _SCHEDULER.fullmatch(self.scheduler):
-            raise ValueError(
-                f"--scheduler {self.scheduler!r}: is no address; valid: an address such as tcp://127.0.0.1:8786"
-            )
+        self.cluster()
+
+    def cluster(self) -> Scheduler | None:
+        """Return the scheduler of --scheduler; ValueError for one that cannot be used."""
+        if self.scheduler is None:
+            return None
+        return Scheduler(self.scheduler, self.tls_ca, self.tls_cert, self.tls_key)
 
     def _require_files_of_their_own(self) -> None:
         taken: dict[Path, str] = {}

@@ -9,9 +9,8 @@ import signal
 import subprocess
 import sys
 import weakref
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -29,6 +28,7 @@ from feelahead.lab.pieces import Piece, results
 from feelahead.lab.sweep import ask, generator, sweep
 from feelahead.printing.progress import Shown
 from tests.feelahead.lab import counting
+from tests.feelahead.lab.clusters import dask_cluster
 from tests.feelahead.lab.counting import QUESTION, TIMED, Cell, Counting, held
 from tests.helpers.machines.waiting import LIMIT_S, wait_until
 from tests.helpers.repository import ROOT
@@ -215,38 +215,6 @@ def _drive(arguments: Sequence[str]) -> "subprocess.Popen[str]":
     return subprocess.Popen([sys.executable, "-c", call], cwd=ROOT, text=True, stderr=subprocess.PIPE)
 
 
-@contextmanager
-def _dask(workers: int) -> Iterator[tuple[str, list["subprocess.Popen[str]"]]]:
-    """Start a dask scheduler and workers on loopback; yield its address and all processes, and end them afterwards."""
-    started: list[subprocess.Popen[str]] = []
-
-    def start(*arguments: str) -> "subprocess.Popen[str]":
-        call = [sys.executable, "-m", "dask", *arguments, "--no-dashboard"]
-        started.append(
-            subprocess.Popen(
-                call, cwd=ROOT, text=True, stderr=subprocess.PIPE, env={**os.environ, "PYTHONPATH": str(ROOT)}
-            )
-        )
-        return started[-1]
-
-    def said(process: "subprocess.Popen[str]", pattern: str) -> str:
-        assert process.stderr is not None
-        for line in process.stderr:
-            if found := re.search(pattern, line):
-                return found[1]
-        raise AssertionError(f"the process ended before it said {pattern}")
-
-    try:
-        address = said(start("scheduler", "--host", "127.0.0.1", "--port", "0"), r"Scheduler at: +(tcp://\S+)")
-        for _ in range(workers):
-            said(start("worker", address, "--nthreads", "1", "--no-nanny"), r"(Registered to)")
-        yield address, started
-    finally:
-        for process in reversed(started):
-            process.kill()
-            process.communicate()
-
-
 @pytest.mark.processes
 def test_a_worker_that_is_killed_leaves_what_is_finished(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "3-2").write_text("kill")
@@ -319,7 +287,7 @@ def test_whatever_is_killed_costs_no_row_and_a_file_of_ones_own_runs_on_a_cluste
 
     shutil.copy(counting.__file__, tmp_path / "mine_counted.py")
     # One worker may still wait in a cell of the killed driver, and one in the same cell of the next.
-    with _dask(3) as (address, (scheduler, worker, *_)):
+    with dask_cluster(3) as (address, (scheduler, worker, *_)):
         call = [sys.executable, "-m", "feelahead", "try", "./mine_counted.py", *_GRID, "--scheduler", address]
         for _ in range(2):  # A cluster accepts the same file twice.
             surroundings = {**os.environ, "PYTHONPATH": str(ROOT)}
