@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from operator_side.hands.travel_calibration import StickRest, TriggerTravel
+from operator_side.hands.travel_calibration import LARGEST_REST, StickRest, TriggerTravel
 
 TRIGGERS = st.builds(TriggerTravel, st.floats(0.0, 0.3), st.floats(0.5, 1.0))
 STICKS = st.builds(StickRest, st.floats(-0.2, 0.2), st.floats(-0.2, 0.2), st.floats(0.0, 0.6))
@@ -54,3 +54,23 @@ def test_a_worn_stick_rests_at_zero_and_reaches_the_end_in_every_direction(
     assert math.hypot(x, y) <= 1.0 + 1e-12
     rim = stick.deflection((math.cos(angle), math.sin(angle)))
     assert math.hypot(*rim) == pytest.approx(1.0, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("x", "y", "dead_zone", "wrong"),
+    [
+        (0.0, 0.0, -0.01, "dead_zone"),
+        (0.0, 0.0, 1.0, "dead_zone"),
+        (0.2, 0.0, 0.8, "dead_zone"),  # A span of nothing, and beyond it a stick that points the other way.
+        (0.15, -0.15, 0.79, "dead_zone"),
+        (0.0, 0.0, math.nan, "dead_zone"),
+        (0.0, 1.01 * LARGEST_REST, 0.1, "x"),
+        (math.nan, 0.0, 0.1, "x"),
+    ],
+)
+def test_a_dead_zone_that_leaves_no_way_to_push_and_a_rest_too_far_out_are_refused(
+    x: float, y: float, dead_zone: float, wrong: str
+) -> None:
+    with pytest.raises(ValueError, match=f"^{wrong} = "):
+        StickRest(x, y, dead_zone)
+    assert StickRest(x=0.2, dead_zone=0.79).deflection((1.0, 0.0)) == (1.0, 0.0)
