@@ -192,6 +192,13 @@ def test_the_newest_map_holds_until_it_is_old_or_another_robot_side_speaks() -> 
         assert report.r2[-1] < 8
 
 
+def test_no_map_is_followed_where_the_robot_side_compensates() -> None:
+    """It reckons with the sticks by itself."""
+    commanded = around(dict.fromkeys((*RIGHT_ACROSS, 0), 0.03))
+    assert strengths(haptics("robot"), message(0.3, commanded)) == strengths(haptics("robot"), message(0.3, None))
+    assert strengths(haptics(), message(0.3, commanded)) != strengths(haptics(), message(0.3, None))
+
+
 def test_a_path_is_traced_once_for_each_write_and_at_once_for_a_new_map() -> None:
     """So an object to which the stick leads is felt at most 10 ms late."""
     commanded, free = around(dict.fromkeys((*RIGHT_ACROSS, 0), 0.03)), around({})

@@ -169,6 +169,7 @@ def test_the_delay_of_driving_is_that_of_each_command_of_the_armed_owner() -> No
     observer, delays = bench.join(3, b"observer"), bench.robot.session.driving_delay
     before = delays.count
     payload = bench.send(operator)
+    assert delays.count == before + 1
     bench.robot.receive(operator.peer, payload, bench.now_s)
     bench.send(observer)
     assert delays.count == before + 1
