@@ -118,6 +118,8 @@ def require_known(split: Sequence[str]) -> None:
         extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
         named = re.findall(r"\[([a-z,]+)\]", arguments[-1])
         assert all(extra in extras for names in named for extra in names.split(","))
+        locks = [word.removeprefix("../../") for word in arguments if word.endswith(".lock")]
+        assert all((ROOT / lock).is_file() for lock in locks)
     elif program in COMMANDS:
         try:
             ended = COMMANDS[program](arguments)
