@@ -93,7 +93,7 @@ def _operators() -> dict[str, Any]:
 
 
 def _places(source: str) -> Iterator[tuple[str, int, int]]:
-    """Yield name of the operator, number of its occurrence, and line of each possible change but of annotations and decorators."""
+    """Yield operator, number of its occurrence, and line of each change, but of annotations and decorators."""
     tree, spans = get_ast(source), list(_annotations(source))
     for name, operator in _OPERATORS.items():
         positions = _Positions(operator)
