@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from common.protocol.messages import Header, MotionCommand
 from operator_side.feel.blindness import Blindness
-from operator_side.feel.commands_under_way import MAX_DELAY_S, CommandsUnderWay, Displacement, Report
+from operator_side.feel.commands_under_way import MAX_DELAY_S, CommandsUnderWay, Displacement, Report, _edges_s
 from operator_side.feel.haptics import Haptics
 from operator_side.feel.rendering import RenderingSettings
 from operator_side.hands.travel_calibration import TravelCalibration
@@ -202,3 +202,13 @@ def test_on_the_way_home_the_robot_sides_reckoning_holds_until_the_last_such_com
         haptics.due(uniform_update(header), (0.0, 0.0), Blindness(), 0.4)
         known.append(haptics.without_history == before)
     assert known == expected
+
+
+@pytest.mark.parametrize("under_way_s", [0.0, 0.004, 0.1, 0.357, MAX_DELAY_S])
+def test_a_course_is_followed_in_steps_of_at_most_10_ms(under_way_s: float) -> None:
+    """A stick that is swapped has turned the path within a step or two."""
+    edges_s, before = _edges_s(1.0, 1.0 + under_way_s)
+    assert edges_s[before] == 1.0
+    assert edges_s[-1] == pytest.approx(1.0 + under_way_s)
+    assert (np.diff(edges_s) >= 0.0).all()
+    assert np.diff(edges_s).max() <= 0.01 + 1e-12

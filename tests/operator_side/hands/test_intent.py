@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import pytest
 
 from operator_side.controller.state import Button, ControllerState
@@ -44,3 +46,14 @@ def test_swapped_sides_swap_triggers_sticks_and_l1_and_nothing_else() -> None:
     assert (plain.run, swapped.run) == (False, True)
     assert swapped.gripper == plain.gripper == 1
     assert not operator_intent(ControllerState(pressed=frozenset({Button.L1})), swap_sides=True).run
+
+
+def test_what_moves_rests_and_the_other_buttons_stay() -> None:
+    moving = OperatorIntent(
+        0.4, 0.7, (0.2, 0.3), (-0.2, 0.1), gripper=1, home=1.0, arm=True, run=True, emergency_stop=True, hand_over=True
+    )
+    resting = moving.resting()
+    assert resting == OperatorIntent(run=True, emergency_stop=True, hand_over=True, raw=moving.raw)
+    assert resting.rests
+    for one in (replace(resting, l2=0.1), replace(resting, lateral=(0.0, -1.0)), replace(resting, turning=(1.0, 0.0))):
+        assert not one.rests
