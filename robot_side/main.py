@@ -4,10 +4,11 @@ import secrets
 from collections.abc import Callable, Sequence
 from typing import Final
 
-from common.clock import clock_domain
+from common.clock import clock_domain, wall_clock_offset_s
 from common.command.command_line import parse_settings, run_command
 from common.command.status import Status
 from common.emulation.spec import unused_clauses
+from common.files.audit_log import AuditLog
 from common.loop.loop import Loop
 from common.loop.process import Process
 from common.recording.provenance import provenance
@@ -69,6 +70,10 @@ def command(arguments: Sequence[str], adapt: Callable[[RobotParts], Adapted] = a
     status, loop = Status(settings.status, "robot"), Loop(settings.tick_period_s(), _REMEDY, settings.seed)
     with Process(settings, "robot", status, RobotEncoder(), loop) as process:
         epoch, recording = secrets.randbits(53), process.recording
+        offset_s = wall_clock_offset_s()
+        log = None if settings.audit is None else AuditLog(settings.audit, lambda: offset_s + loop.clock.now())
+        if log is not None:
+            process.stack.callback(log.close)
         door = process.stack.enter_context(Door(ports, process.note))
         drivers = ConnectedDrivers(door, process.note)
         parts = build_parts(settings, epoch, clock_domain(), announce=process.note, drivers=drivers)
@@ -100,7 +105,7 @@ def command(arguments: Sequence[str], adapt: Callable[[RobotParts], Adapted] = a
             if settings.insecure and settings.keys is None:
                 process.note(_OPEN_TO_ALL)
             status.event("listening", control=at.control, view=at.view)
-            turns = RobotTurns(settings, core, view, cameras, door, process, drivers, physics)
+            turns = RobotTurns(settings, core, view, cameras, door, process, drivers, physics, log)
             process.stack.enter_context(late_kernels(turns.note_late))
             return turns
 

@@ -78,6 +78,9 @@ class RobotSettings(SideOptions):
     keys: Annotated[Path | None, tyro.conf.arg(metavar="FOLDER")] = None
     """Admit only operators whose keys FOLDER allows, and encrypt everything; needed for connections beyond this
     machine. To make FOLDER: feelahead keys make robot; then, for each operator: feelahead keys allow NAME KEY."""
+    audit: Annotated[Path | None, tyro.conf.arg(metavar="FILE.jsonl")] = None
+    """Add to this file who connected, armed, was refused, revoked or cut off, and when; one JSON object a line. At 1 MB
+    it is put aside as FILE.jsonl.1; eight are kept."""
     insecure: bool = False
     """Listen for other machines without keys: anyone who reaches the port can move the arm."""
     model: Annotated[Path | None, tyro.conf.arg(metavar="FILE.xml")] = None

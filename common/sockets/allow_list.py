@@ -17,6 +17,8 @@ class AllowList:
     """Names of the admitted peers, keyed by their public keys."""
     roles: dict[str, KeyRole] = field(default_factory=dict)
     """Their roles, keyed likewise"""
+    revoked: list[str] = field(default_factory=list)
+    """Names that were revoked, or got another role, since the caller emptied it"""
     barred: frozenset[str] = frozenset()
     """Keys that are not let in at present, although they are allowed"""
     unreadable: str | None = None
@@ -33,7 +35,7 @@ class AllowList:
         An unreadable folder admits nobody. But if it is unreadable for lack of descriptors or memory, the list stays: a
         peer that exhausts these must not get others excluded.
         """
-        before = dict(self.roles)
+        before, names = self.roles, self.names
         try:
             fingerprint = self.folder.fingerprint()
             if fingerprint == self._fingerprint:
@@ -50,7 +52,9 @@ class AllowList:
                 None,
                 fingerprint,
             )
-        return {key for key, role in before.items() if self.roles.get(key) != role}
+        revoked = {key for key, role in before.items() if self.roles.get(key) != role}
+        self.revoked += [names[key] for key in revoked]
+        return revoked
 
     def admits(self, key: str, roles: Collection[KeyRole]) -> bool:
         """Return whether a key is allowed, has one of these roles, and is not barred."""

@@ -109,6 +109,8 @@ class Authenticator:
         self.refused = 0
         """Number of handshakes with a key that is not allowed."""
         self._allowed, self._roles = allowed, roles
+        self.refusals: list[tuple[str, str]] = []
+        """Keys that were refused for the first time, and their addresses; the caller empties it"""
         self._refused_keys: dict[str, bool] = {}
         self._questions = context.socket(zmq.REP)
         self._questions.setsockopt(zmq.LINGER, 0)
@@ -152,6 +154,7 @@ class Authenticator:
         is_new = key not in self._refused_keys and key not in self._allowed.barred
         if is_curve and is_new and len(self._refused_keys) < _REMEMBERED_REFUSALS:
             self._refused_keys[key] = True
+            self.refusals.append((key, question[3].decode("ascii", "replace")))
         return [b"1.0", request, b"400", b"not allowed", b"", b""]
 
 

@@ -61,6 +61,9 @@ class DriverPort(SocketShell):
         """Numbers of messages from peers whose keys were revoked after their handshake, of messages above
         PEER_LIMIT_PER_S, and of connections that were ended because of MOST_CONNECTIONS"""
         self._keys, self._role = keys, role
+        self._heard: dict[bytes, tuple[str, int]] = {}
+        """Key and descriptor of the peers that were heard in this second or the last one"""
+        self._heard_before: dict[bytes, tuple[str, int]] = {}
         self._counted: Counter[bytes | str] = Counter()
         self._second = 0
         self._flooding: set[str] = set()
@@ -92,6 +95,7 @@ class DriverPort(SocketShell):
         if (second := int(now_s)) != self._second:
             self._second = second
             self._counted.clear()
+            self._heard_before, self._heard = self._heard, {}
         self.crowded += self._ports.update(now_s)
         received = []
         for name, *frames in self._inbox.read():
@@ -132,6 +136,11 @@ class DriverPort(SocketShell):
         size, descriptor = self._ports.cut_off(now_s)
         return size, peer_address(descriptor)
 
+    def present(self) -> dict[bytes, tuple[str, str]]:
+        """Return key and address of the peers that were heard lately, keyed by their names."""
+        heard = self._heard_before | self._heard
+        return {name: (key, peer_address(descriptor)) for name, (key, descriptor) in heard.items()}
+
     def take_flooding(self) -> set[str]:
         """Return the keys that were cut off because of PEER_LIMIT_PER_S since the last call."""
         flooding, self._flooding = self._flooding, set()
@@ -145,6 +154,7 @@ class DriverPort(SocketShell):
         revoked = self._keys is not None and not self._keys.allowed.admits(key, (self._role,))
         if not revoked and self._counted[key or name] <= PEER_LIMIT_PER_S:
             self._ports.gates[0].connections.introduced(descriptor)
+            self._heard[name] = key, descriptor
             return True
         self.revoked += revoked
         self.flooding += not revoked

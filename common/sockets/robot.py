@@ -193,6 +193,12 @@ class RobotSockets(SocketShell):
         name = names.get(self._peers.key_at(descriptor))
         return size, f"{'' if name is None else f'{name} at '}{peer_address(descriptor)}"
 
+    def present(self) -> dict[bytes, tuple[str, str]]:
+        """Return key and address of the peers that have been heard, keyed by their names."""
+        return {
+            each.peer.name: (each.peer.key, peer_address(each.descriptor)) for each in self._peers.connections.values()
+        }
+
     def take_flooding(self) -> set[str]:
         """Return the keys that were cut off because of PEER_LIMIT_PER_S since the last call."""
         flooding, self._flooding = self._flooding, set()

@@ -117,6 +117,13 @@ class SocketShell:
         """Number of handshakes with a key that is not allowed."""
         return 0 if self._authenticator is None else self._authenticator.refused
 
+    def take_refusals(self) -> list[tuple[str, str]]:
+        """Return the keys that a bound socket has refused for the first time since the last call, with addresses."""
+        if self._authenticator is None:
+            return []
+        refusals, self._authenticator.refusals = self._authenticator.refusals, []
+        return refusals
+
     @property
     def heavy(self) -> int:
         """Number of connections to a bound socket that were ended because they sent too many bytes."""

@@ -58,7 +58,8 @@ ARROWS = """
     robot_side/drivers/mujoco: common common/files common/protocol robot_side/arm robot_side/compiled
         robot_side/gripper robot_side/overlap/meshes robot_side/surroundings robot_side/surroundings/kinds
         robot_side/tick/truth.py
-    robot_side/reporting: common common/emulation common/protocol common/rate common/sockets robot_side/arm
+    robot_side/reporting: common common/emulation common/protocol common/rate common/sockets common/sockets/door
+        robot_side/arm
         robot_side/operators robot_side/tick
     robot_side/outcome: common robot_side/tick robot_side/tick/truth.py
     robot_side/recording: common common/recording robot_side/arm robot_side/surroundings robot_side/tick
@@ -74,7 +75,7 @@ ARROWS = """
     robot_side/parts.py: common common/protocol common/timing robot_side/arm robot_side/compiled robot_side/core
         robot_side/drivers/mujoco robot_side/drivers/mujoco/checks robot_side/drivers/remote robot_side/gripper
         robot_side/laws/named.py robot_side/operators robot_side/settings.py robot_side/surroundings
-    robot_side: common common/command common/emulation common/loop common/protocol common/recording
+    robot_side: common common/command common/emulation common/files common/loop common/protocol common/recording
         common/sockets/door common/status robot_side/arm robot_side/compiled robot_side/core robot_side/drivers/mujoco
         robot_side/drivers/remote robot_side/parts.py robot_side/recording robot_side/reporting robot_side/settings.py
         robot_side/tick robot_side/viewing
@@ -149,7 +150,7 @@ LIBRARIES = {
     # A wall clock may jump by an hour, so it must not be available; a recording's stamps use that clock.
     "datetime": ("feelahead/recordings",),
     "calendar": (),
-    "common.clock.wall_clock_offset_s": ("common/recording",),
+    "common.clock.wall_clock_offset_s": ("common/recording", "robot_side/main.py"),
     "time": (
         "common/clock.py",
         "operator_side/dualsense/hid/release_watchdog.py",

@@ -18,6 +18,7 @@ from common.sockets.door.messages import (
     Close,
     DoorSettings,
     DriverSettings,
+    Event,
     Failed,
     Figures,
     FromDriver,
@@ -108,9 +109,10 @@ class Door:
         self.restarts = 0
         self.clock = clock or MonotonicClock()
         self._settings, self._note, self._start = settings, note, start
+        self._events: deque[Event] = deque(maxlen=_WAITING)
         self.ports = {flag: DriverPort(self, flag) for flag in settings.drivers}
         self._arrived: deque[tuple[bytes, bytes]] = deque(maxlen=_WAITING)
-        self._figures = Figures({}, TcpFigures(), [], "")
+        self._figures = Figures({}, TcpFigures(), [], [], "")
         self._before: dict[str, int] = {}
         """Counts of doors that have ended"""
         self._owner: bytes | None = None
@@ -163,6 +165,12 @@ class Door:
         if peer != self._owner:
             self._owner = peer
             self.ask(Owner(peer))
+
+    def take_events(self) -> list[Event]:
+        """Return what happened at the ports since the last call, oldest first."""
+        events = list(self._events)
+        self._events.clear()
+        return events
 
     def tcp_figures(self, peer: bytes) -> TcpFigures:
         """Return the kernel's TCP figures of all connections to the owner; those of no packet for another peer."""
@@ -243,6 +251,7 @@ class Door:
                 self._figures = said
                 for text in said.notes:
                     self._note(text)
+                self._events.extend(said.events)
             case Ready(drivers, notes):
                 self._ready = True
                 bound = {
@@ -285,4 +294,4 @@ class Door:
         who = f"; most came from {busiest}" if busiest else ""
         self._note(f"the process that owns the ports {how}; another one is started, and peers connect again{who}")
         self._before = self.counts()
-        self._figures = Figures({}, TcpFigures(), [], "")
+        self._figures = Figures({}, TcpFigures(), [], [], "")

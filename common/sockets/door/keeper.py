@@ -9,7 +9,7 @@ import sys
 from collections.abc import Sequence
 from contextlib import ExitStack, closing, nullcontext
 from pathlib import Path
-from typing import Final
+from typing import Final, cast
 
 import msgspec
 
@@ -25,10 +25,12 @@ from common.sockets.door.messages import (
     Asked,
     Close,
     DoorSettings,
+    Event,
     Failed,
     Figures,
     FromDriver,
     FromPeer,
+    Kind,
     Listen,
     Listening,
     Owner,
@@ -52,6 +54,8 @@ KEYS_S: Final = 0.2
 _BARRED_S: Final = 10.0
 """Time for which a key that flooded is not let in, in seconds"""
 _WAIT_S: Final = 0.05
+_MOST_EVENTS: Final = 20
+"""Largest number of events of a kind, each tenth of a second: strangers without keys make as many names as they like"""
 
 
 class Keeper:
@@ -67,6 +71,8 @@ class Keeper:
         self._unpassed = 0
         self._barred: dict[str, float] = {}
         self._busiest = ""
+        self._present: dict[tuple[str, bytes], tuple[str, str]] = {}
+        self._heavy = 0
         self._watch_s = self._keys_s = self._clock.now()
         self._ends = False
         # Fail at once for an occupied port; open meanwhile, so that a program's flag with the same port is named.
@@ -163,11 +169,38 @@ class Keeper:
             if sockets is not None:
                 sockets.refresh_keys()
                 notes += sockets.news()
+        before = self._barred.keys()
         notes += self._bar(flooding, now_s)
         size, who = heaviest
+        events = self._events(sorted(self._barred.keys() - before))
+        if (heavy := self._counts()["heavy"]) > self._heavy:
+            self._heavy = heavy
+            events.append(Event("cut off", "", who))
         if size:
             self._busiest = f"{who}, {1e-3 * size / _WATCH_S:.0f} kB/s"
-        self._say(Figures(self._counts(), self._tcp(), notes, self._busiest))
+        self._say(Figures(self._counts(), self._tcp(), notes, events, self._busiest))
+
+    def _events(self, barred: Sequence[str]) -> list[Event]:
+        """Return what is new for the audit log. barred: keys that are barred now."""
+        names = {} if self._keys is None else self._keys.allowed.names
+        ports: dict[str, DriverPort | RobotSockets] = {**self._drivers}
+        if self._sockets is not None:
+            ports["--bind"] = self._sockets
+        before = self._present
+        self._present = {(flag, peer): who for flag, port in ports.items() for peer, who in port.present().items()}
+        events = [Event("barred", names.get(key, key), "") for key in barred]
+        for kind, one, other in (("connected", self._present, before), ("left", before, self._present)):
+            new = [(place, who) for place, who in one.items() if place not in other]
+            for (flag, peer), (key, address) in new[:_MOST_EVENTS]:
+                shown = peer if flag == "--bind" else b""
+                events.append(Event(cast(Kind, kind), names.get(key, key), f"{address} at {flag}", shown))
+        for flag, port in ports.items():
+            refusals = port.take_refusals()
+            events += [Event("refused", names.get(key, key), f"{address} at {flag}") for key, address in refusals]
+        if self._keys is not None:
+            events += [Event("revoked", name, "") for name in self._keys.allowed.revoked]
+            self._keys.allowed.revoked.clear()
+        return events
 
     def _bar(self, flooding: set[str], now_s: float) -> list[str]:
         """Let no key in for a while that flooded; return a line for each."""

@@ -1,6 +1,6 @@
 """Messages between the door and the process that ticks. Each is one message of a `Channel`."""
 
-from typing import Final
+from typing import Final, Literal
 
 import msgspec
 from msgspec import Struct
@@ -76,6 +76,21 @@ class Failed(Struct, frozen=True, array_like=True, tag=5):
     text: str
 
 
+Kind = Literal["connected", "left", "refused", "revoked", "barred", "cut off"]
+
+
+class Event(Struct, frozen=True, array_like=True):
+    """What somebody did, or what was done to them, for the audit log."""
+
+    kind: Kind
+    who: str
+    """Name of the key, or the key itself if it is unknown; empty without keys"""
+    where: str
+    """Address and port at the other end, as far as it is known"""
+    peer: bytes = b""
+    """Name of the peer at the control port"""
+
+
 class Figures(Struct, frozen=True, array_like=True, tag=6):
     """What has happened at the ports since they were opened; sent ten times a second, and before the end."""
 
@@ -83,6 +98,7 @@ class Figures(Struct, frozen=True, array_like=True, tag=6):
     tcp: TcpFigures
     """Figures of the owner's connections"""
     notes: list[str]
+    events: list[Event]
     busiest: str
     """Who sent most bytes in the last second, in words; empty if nobody sent anything"""
 

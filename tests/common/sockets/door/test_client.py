@@ -67,7 +67,7 @@ class Run:
     def __init__(self, *says: Said) -> None:
         self.says: tuple[Said, ...] = says
         self.clock, self.notes, self.keepers = VirtualClock(), list[str](), list[Keeper]()
-        self.door = Door(SETTINGS, self.notes.append, self.clock, self.start)
+        self.door = Door(SETTINGS, self.notes.append, clock=self.clock, start=self.start)
 
     def start(self, text: str) -> Companion:
         self.keepers.append(Keeper(text, *self.says))
@@ -95,7 +95,7 @@ def run() -> Iterator[Run]:
 
 
 def figures(count: int, busiest: str = "") -> Figures:
-    return Figures({"unread": count}, TcpFigures(), [], busiest)
+    return Figures({"unread": count}, TcpFigures(), [], [], busiest)
 
 
 def test_messages_come_from_their_ports(run: Run) -> None:
