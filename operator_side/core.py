@@ -239,7 +239,7 @@ class OperatorSide:
 
     def status(self, now_s: float) -> OperatorStatus:
         """Return the status, without the fields that only the process knows."""
-        mean_s, screen, update = self.link.delay.mean, self.screen, self.stiffness
+        mean_s, screen, update, standing = self.link.delay.mean, self.screen, self.stiffness, self._standing
         intent, rendering = self.hands.present(now_s), self.haptics.rendering
         order, linked = -1 if self.settings.swap_sides else 1, self.newest_stiffness.within(STIFFNESS_EXPIRES_S, now_s)
         left, right = ((None, None) if update is None else (update.l2.stiffness, update.r2.stiffness))[::order]
@@ -250,7 +250,7 @@ class OperatorSide:
         return OperatorStatus(
             **link,
             state=None if update is None else update.state,
-            stopped_because=self._standing.stop_reason if self.newest_stiffness.stopped else None,
+            stopped_because=standing.stop_reason if self.newest_stiffness.stopped or standing.was_not_armed else None,
             l2=left,
             r2=right,
             l2_pulled=left_pulled,

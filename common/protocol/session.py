@@ -20,13 +20,13 @@ class SessionState(StrEnum):
     DISARMED = "disarmed"
     """Owner of the lease; the arm is still."""
     READY = "ready"
-    """Disarmed, but the arming button arms: for a second commands have come in time, with released triggers."""
+    """Disarmed, but the arming button arms: for a second commands have come in time, with all inputs at rest."""
     ARMED = "armed"
     """Owner of the lease, whose commands reach the arm."""
     STOPPED = "stopped"
     """Owner of the lease under an emergency stop."""
     STOPPED_READY = "stopped_ready"
-    """Stopped, but the arming button arms: for a second commands have come in time, with released triggers."""
+    """Stopped, but the arming button arms: for a second commands have come in time, with all inputs at rest."""
     AWAY = "away"
     """Silent and without the lease; the session is remembered, so that the operator can return."""
     ENDED = "ended"
@@ -40,9 +40,10 @@ class SessionEvent(Enum):
     ASKED_WHILE_HELD = "Hello (or any message when away), lease held"
     ASKED_WHILE_FULL = "Hello, no room for another observer"
     LEASE_PASSED = "lease passed on to it"
-    HEALTHY = "healthy second with released triggers"
+    HEALTHY = "healthy second with all inputs at rest"
     ARM = "arming button pressed"
-    TRIGGER_PULLED = "trigger pulled"
+    ARM_EARLY = "arming button pressed too early"
+    INPUT_HELD = "trigger, stick, gripper or home held"
     GAP = "no command for longer than the gap limit"
     OLD_LOOP = "loop age over the limit"
     ARM_LOST = "arm's newest state too old"
@@ -54,6 +55,9 @@ class SessionEvent(Enum):
     NEW_EPOCH = "another epoch on its connection"
     FORGOTTEN = "room needed"
 
+
+NOT_ARMED: Final = "not armed"
+"""First words of the reason why a press of the arming button did not arm"""
 
 OWNING: Final = frozenset(
     {
@@ -86,6 +90,7 @@ def _rows(
 
 _ARM_LOST: Final = "arm lost: nothing new is heard of it"
 _ASTRAY: Final = "the arm does not follow"
+_INPUT_HELD: Final = "arming needs triggers, sticks, gripper and home at rest"
 
 
 def _build() -> tuple[Transition, ...]:
@@ -101,8 +106,9 @@ def _build() -> tuple[Transition, ...]:
         *_rows([state.DISARMED], event.HEALTHY, state.READY, "may be armed"),
         *_rows([state.STOPPED], event.HEALTHY, state.STOPPED_READY, "may be armed again"),
         *_rows([state.READY, state.STOPPED_READY], event.ARM, state.ARMED, "armed on purpose"),
-        *_rows([state.READY], event.TRIGGER_PULLED, state.DISARMED, "arming needs released triggers"),
-        *_rows([state.STOPPED_READY], event.TRIGGER_PULLED, state.STOPPED, "arming needs released triggers"),
+        *_rows([state.DISARMED, state.STOPPED], event.ARM_EARLY, None, NOT_ARMED),
+        *_rows([state.READY], event.INPUT_HELD, state.DISARMED, _INPUT_HELD),
+        *_rows([state.STOPPED_READY], event.INPUT_HELD, state.STOPPED, _INPUT_HELD),
         *_rows([state.READY, state.ARMED], event.GAP, state.DISARMED, "no command for longer than the gap limit"),
         *_rows([state.STOPPED_READY], event.GAP, state.STOPPED, "no command for longer than the gap limit"),
         *_rows([state.READY, state.ARMED], event.OLD_LOOP, state.DISARMED, "loop age over the limit"),

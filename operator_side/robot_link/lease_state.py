@@ -4,7 +4,7 @@ import math
 from typing import Any, Final
 
 from common.protocol.messages import LeaseNotice, LinkReport
-from common.protocol.session import OWNING, SessionState
+from common.protocol.session import NOT_ARMED, OWNING, SessionState
 from common.status.codes import LinkState
 from operator_side.robot_link.newest import overtakes
 
@@ -39,6 +39,11 @@ class LeaseState:
         """Whether we have the lease, so that our commands count."""
         return self.lease is not None and self.lease.session in OWNING
 
+    @property
+    def was_not_armed(self) -> bool:
+        """Whether `stop_reason` says why a press of the arming button did not arm."""
+        return self.stop_reason is not None and self.stop_reason.startswith(NOT_ARMED)
+
     def read(self, notice: LeaseNotice, now_s: float) -> bool:
         """Take a notice; return whether we must begin a new epoch, because the robot side has ended our session."""
         restarted = now_s - self._anew_s < _NEW_EPOCH_S
@@ -51,6 +56,8 @@ class LeaseState:
         self.lease, self._heard_s = notice, now_s
         if notice.session in (SessionState.DISARMED, SessionState.STOPPED):
             self.stop_reason = notice.why
+        elif self.was_not_armed:
+            self.stop_reason = None
         if notice.session is not SessionState.ENDED or restarted:
             return False
         self._anew_s = now_s

@@ -203,7 +203,7 @@ class RobotSide:
         status = RobotStatus(
             link=LinkState.UP if lease.owner is not None else LinkState.LOST if lease.token > 0 else LinkState.WAITING,
             state=safety.state,
-            stopped_because=safety.stops[-1][1] if safety.stops and safety.state != "armed" else None,
+            stopped_because=safety.still_because,
             owner=None if lease.owner is None else lease.owner.state,
             observers=len(lease.observers()),
             refused=self.session.refused,

@@ -15,10 +15,11 @@ from msgspec import Meta
 from common.limits import check_limits
 from common.protocol.link_end import Arrival
 from common.protocol.messages import MotionCommand, MotionState
-from common.protocol.session import Session, SessionEvent, SessionState
+from common.protocol.session import NOT_ARMED, Session, SessionEvent, SessionState
 
 RELEASED_TRAVEL = 0.02
-"""Largest travel, 0 to 1, that counts as released: a calibrated trigger at rest reads 0, apart from a count or so"""
+"""Largest travel or deflection, 0 to 1, that counts as at rest: a calibrated trigger or stick at rest reads 0, apart
+from a count or so"""
 _REMEMBERED_STOPS = 1000
 
 _Limit = Annotated[float, Meta(gt=0.0, lt=60.0)]
@@ -38,7 +39,7 @@ class SafetySettings:
     max_delay_s: _Limit = 2.0
     """Loop age above which the arm is disarmed."""
     healthy_s: _Allowance = 1.0
-    """Time for which commands must have arrived, with released triggers, before the arm can be armed."""
+    """Time for which commands must have arrived, with all inputs at rest, before the arm can be armed."""
     arm_s: _Limit = 0.1
     """Age of the arm's newest state above which the arm is lost."""
     lease_s: _Limit = 0.9
@@ -90,6 +91,15 @@ class Safety:
         if self._session is not None and self._session.state is SessionState.ARMED:
             return "armed"
         return "stopped" if self._stopped else "disarmed"
+
+    @property
+    def still_because(self) -> str | None:
+        """Why the arm stopped, or was not armed when this was asked for; None while it is armed, or before both"""
+        if self.state == "armed":
+            return None
+        if self._session is not None and self._session.why.startswith(NOT_ARMED):
+            return self._session.why
+        return self.stops[-1][1] if self.stops else None
 
     @property
     def command(self) -> MotionCommand | None:
@@ -188,28 +198,31 @@ class Safety:
         self._arm_was_down = command.arm
         if self.state == "armed":
             return
-        if command.l2 > RELEASED_TRAVEL or command.r2 > RELEASED_TRAVEL:
-            self._handle(SessionEvent.TRIGGER_PULLED, now_s)
-        elif command.emergency_stop:
-            self._healthy_since_s = None
-        elif self._loop_is_young(now_s) and not (self._arm_lost or self._arm_astray):
+        held = _held(command)
+        if held is not None:
+            self._handle(SessionEvent.INPUT_HELD, now_s)
+        elif not self._loop_is_young(now_s) or self._arm_lost or self._arm_astray:
+            return  # their own reasons are told
+        else:
             if self._healthy_since_s is None:
                 self._healthy_since_s = now_s
             if self._healthy_for_long(now_s):
                 self._handle(SessionEvent.HEALTHY, now_s)
-                if pressed:
-                    self._handle(SessionEvent.ARM, now_s)
+        if pressed:
+            self._handle(SessionEvent.ARM, now_s)
+            why = held or f"press again after {self.settings.healthy_s:g} s without faults"
+            self._handle(SessionEvent.ARM_EARLY, now_s, f"{NOT_ARMED}: {why}")
 
     def _healthy_for_long(self, now_s: float) -> bool:
         return self._healthy_since_s is not None and now_s - self._healthy_since_s >= self.settings.healthy_s
 
     def _handle(self, event: SessionEvent, now_s: float, why: str | None = None) -> None:
-        """Apply an event to the session's state table; every event but HEALTHY restarts the time `healthy_s`."""
-        if event is not SessionEvent.HEALTHY:
+        """Apply an event to the session's state table; most events restart the time `healthy_s`."""
+        if event not in (SessionEvent.HEALTHY, SessionEvent.ARM, SessionEvent.ARM_EARLY):
             self._healthy_since_s = None
         if event is SessionEvent.EMERGENCY_STOP:
             self._stopped = True
-        said = why if event is SessionEvent.ASTRAY else None
+        said = why if event in (SessionEvent.ASTRAY, SessionEvent.ARM_EARLY) else None
         row = None if self._session is None else self._session.handle(event, said)
         if row is None:
             return
@@ -217,3 +230,16 @@ class Safety:
             self._stopped = False
         elif row.before is SessionState.ARMED or event is SessionEvent.EMERGENCY_STOP:
             self.stops.append((now_s, why or row.why))
+
+
+def _held(command: MotionCommand) -> str | None:
+    """Return which input keeps the arm from being armed, in words; None if all are at rest."""
+    if max(command.l2, command.r2) > RELEASED_TRAVEL:
+        return "a trigger is pulled"
+    if max(map(abs, (*command.lateral, *command.turning))) > RELEASED_TRAVEL:
+        return "a stick is deflected"
+    if command.gripper != 0.0:
+        return "a gripper button is held"
+    if command.home > 0.0:
+        return "home is held"
+    return "the emergency stop is held" if command.emergency_stop else None

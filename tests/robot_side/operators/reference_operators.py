@@ -111,7 +111,8 @@ class ReferenceOperators:
         if self.loop_began_s is not None:
             self.echo_s = self.loop_began_s
         pressed, self.arm_down = command.arm and not self.arm_down, command.arm
-        released = max(command.l2, command.r2) <= RELEASED_TRAVEL
+        inputs = command.l2, command.r2, *command.lateral, *command.turning
+        released = not (command.gripper or command.home) and all(abs(one) <= RELEASED_TRAVEL for one in inputs)
         if not self._loop_is_young(now_s) or not (released or owner.state is State.ARMED):
             self._disarm(now_s, "loop age of")
         elif command.emergency_stop:

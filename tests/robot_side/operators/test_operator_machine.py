@@ -30,6 +30,12 @@ triggers = st.sampled_from(
     [(0.0, 0.0)] * 4 + [(RELEASED_TRAVEL, RELEASED_TRAVEL), (0.021, 0.0), (0.0, 0.021), (1.0, 1.0)]
 )
 rarely = st.sampled_from([False, False, False, True])
+
+
+def mostly(rests: Any, *held: Any) -> st.SearchStrategy[Any]:
+    return st.sampled_from([rests] * 8 + list(held))
+
+
 arrivals = st.builds(
     Arrival,
     fresh=st.just(value=True),
@@ -95,6 +101,8 @@ class OperatorMachine(RuleBasedStateMachine):
         content=st.fixed_dictionaries(
             {"run": st.booleans(), "arm": st.booleans()}
             | dict.fromkeys(("emergency_stop", "hand_over", "next_target"), rarely)
+            | {"home": mostly(0.0, 0.5), "gripper": mostly(0.0, -1.0)}
+            | dict.fromkeys(("lateral", "turning"), mostly((0.0, 0.0), (0.0, -0.02), (0.021, 0.0), (0.0, -1.0)))
         ),
         travels=triggers,
     )
@@ -104,7 +112,7 @@ class OperatorMachine(RuleBasedStateMachine):
         whose: str,
         epoch: int,
         behind: int,
-        content: dict[str, bool],
+        content: dict[str, Any],
         travels: tuple[float, float],
     ) -> None:
         """Send one command. behind: 0 for the token of the present lease, 1 for a token that is one less."""
