@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from common.arrays import FloatArray
+from common.arrays import BoolArray, FloatArray
 from common.errors import ConfigurationError
 from common.protocol.link_end import LinkEnd
 from common.roles import Role
@@ -116,8 +116,7 @@ def build_parts(
     # Before the first tick, as a search for spheres takes far longer than one.
     first = _as_loaded(scene, scene.roles) if settings.objects is None else perceived([], [], 0.0)
     held_covers = HeldCovers(first, settings.cover_m, scene.never_held, searching)
-    slides = scene.model.jnt_type[scene.robot.arm_joints] == JointKind.SLIDE
-    joint_limits = limits.of_joints(arm.joint_count, *ends_rad, slides)
+    joint_limits = limits.of_joints(arm.joint_count, *ends_rad, _slides(scene))
     surroundings = Surroundings()
     prediction, prediction_note = settings.prediction_for(scene.robot.fingerprint)
     errors = settings.uncertainty(prediction)
@@ -187,8 +186,15 @@ def _arm(
     robot, (travel, ends_rad) = scene.robot, stand(scene)
     opening_m = 0.0 if travel is None else float(travel.openings_m[0])
     open_fingers = scene.data.qpos[robot.finger_positions].copy()
-    shape = ArmShape(*joint_names(scene), open_fingers, opening_m)
+    joints = limits.of_joints(len(robot.arm_joints), *ends_rad, _slides(scene))
+    shape = ArmShape(*joint_names(scene), open_fingers, opening_m, joints, encoder.standard_deviation_rad())
     return drivers.arm(shape, scene.show), ends_rad, travel
+
+
+def _slides(scene: Scene) -> BoolArray:
+    """Return whether each of the arm's joints slides, (n,)."""
+    slides: BoolArray = scene.model.jnt_type[scene.robot.arm_joints] == JointKind.SLIDE
+    return slides
 
 
 def _camera(settings: RobotSettings, scene: Scene, seed: int) -> MujocoCamera:

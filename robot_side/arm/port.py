@@ -34,6 +34,8 @@ class ArmState:
     carries, less what supports it. N for a prismatic joint. None from an arm that does not measure them."""
     simulated_s: float | None = None
     """Simulated time, which slow physics lets fall behind `time_s`; None if nothing is simulated"""
+    doubt: str | None = None
+    """Why the arm must not move by this state, in words; None if nothing speaks against it"""
 
 
 class Arm(Protocol):

@@ -96,10 +96,10 @@ class RobotSide:
         begin("arm")
         self._measured = parts.arm.state(now_s)
         begin("pose")
-        late_s = lateness_s(self._measured, now_s)
+        late_s, doubt = lateness_s(self._measured, now_s), self._measured.doubt
         following = self.motion.following
         following.update(self.motion.commanded_rad_s, self._measured, late_s, self._touches)
-        delay_s = self._follow_operator(now_s, late_s)
+        delay_s = self._follow_operator(now_s, late_s, doubt)
         self._joints.update(self._measured)
         state = self._joints.carried(late_s)
         pose = parts.kinematics.pose(state)
@@ -141,15 +141,17 @@ class RobotSide:
         self._found = Found(*found, holds_target, sight.target_m)
         return outgoing
 
-    def _follow_operator(self, now_s: float, late_s: float) -> float:
+    def _follow_operator(self, now_s: float, late_s: float, doubt: str | None) -> float:
         """Update the lease's owner and the loop age; return the loop age t_d of eq. 8.
 
         late_s: lateness of the arm's states, in seconds. Commands take about as long to reach the arm, so it is added.
+        doubt: of the newest state.
         """
         session, loop_age = self.session, self.parts.loop_age
         session.update(now_s)
         session.safety.arm_measured(late_s, now_s)
-        session.safety.arm_followed(self.motion.following.stop, now_s)
+        stop = self.motion.following.stop
+        session.safety.arm_followed(doubt if stop is None else f"the arm does not follow: {stop}", now_s)
         if session.take_owner_changed():
             loop_age.reset()
             self.reports.begin_epoch()

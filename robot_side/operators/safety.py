@@ -24,6 +24,8 @@ _REMEMBERED_STOPS = 1000
 
 _Limit = Annotated[float, Meta(gt=0.0, lt=60.0)]
 _Allowance = Annotated[float, Meta(ge=0.0, lt=60.0)]
+_Fresh = Annotated[float, Meta(gt=0.0, lt=1.0)]
+"""Limit below the silence after which another driver may take over (`driver_session.TAKEN_OVER_S`)"""
 
 
 @dataclass(frozen=True)
@@ -40,7 +42,7 @@ class SafetySettings:
     """Loop age above which the arm is disarmed."""
     healthy_s: _Allowance = 1.0
     """Time for which commands must have arrived, with all inputs at rest, before the arm can be armed."""
-    arm_s: _Limit = 0.1
+    arm_s: _Fresh = 0.1
     """Age of the arm's newest state above which the arm is lost."""
     lease_s: _Limit = 0.9
     """Silence after which an operator loses the lease; the default keeps this within a second, a tick included."""
@@ -166,10 +168,13 @@ class Safety:
             self._handle(SessionEvent.ARM_LOST, now_s, f"arm lost: its newest state is {1e3 * age_s:.0f} ms old")
 
     def arm_followed(self, stop: str | None, now_s: float) -> None:
-        """Stop the arm if it does not do what it is told; to be called in every tick. stop: why; None if it does."""
+        """Stop the arm if it does not do what it is told, or its states are doubted; to be called in every tick.
+
+        stop: why, in words; None if it follows.
+        """
         self._arm_astray = stop is not None
         if stop is not None:
-            self._handle(SessionEvent.ASTRAY, now_s, f"the arm does not follow: {stop}")
+            self._handle(SessionEvent.ASTRAY, now_s, stop)
 
     def check(self, now_s: float) -> None:
         """Stop the arm if the gap or the loop age is beyond its limit."""

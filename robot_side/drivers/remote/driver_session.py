@@ -2,6 +2,7 @@
 
 import math
 from collections import Counter
+from dataclasses import replace
 from typing import Final, Literal, NamedTuple
 
 import msgspec
@@ -11,6 +12,7 @@ from common.errors import OtherVersionError, RemoteProtocolError
 from common.periods import EARLY
 from common.timing.clock_offset import MAX_SKEW, ROUNDING
 from common.timing.offset_interval import OffsetInterval
+from robot_side.arm.ability import JointLimits
 from robot_side.arm.port import ArmState
 from robot_side.drivers.remote.messages import (
     DRIVER_VERSION,
@@ -21,6 +23,7 @@ from robot_side.drivers.remote.messages import (
     encode,
     floats,
 )
+from robot_side.drivers.remote.plausibility import Plausibility
 
 
 class DriverClock:
@@ -63,6 +66,10 @@ class DriverClock:
 
 SILENT_S: Final = 0.1
 """Silence, in seconds, after which a driver is lost"""
+TAKEN_OVER_S: Final = 1.0
+"""Silence, in seconds, after which another driver may take over. The arm is lost before, so nobody is armed then."""
+_DOUBTED_S: Final = 0.5
+"""Time, in seconds, for which the arm cannot be armed after its states were doubted"""
 COMMAND_PERIOD_S: Final = 0.004
 """Period of commands, in seconds, to the nearest turn; a command that stops the arm leaves at once."""
 _REFUSAL_PERIOD_S: Final = 1.0
@@ -73,11 +80,11 @@ _DECODER: Final = msgspec.msgpack.Decoder(DriverState)
 _UNANSWERED: Final = 250
 """Number of commands without an echo, as many as in a second, after which the driver counts as not echoing"""
 
-Why = Literal["second", "version", "malformed", "joints", "order", "echo", "clock"]
+Why = Literal["second", "version", "malformed", "joints", "order", "echo", "clock", "impossible"]
 
 
 class ArmShape(NamedTuple):
-    """Names of the joints in every state, and the gripper's values for states that lack them."""
+    """Names and limits of the joints in every state, and the gripper's values for states that lack them."""
 
     joint_names: tuple[str, ...]
     finger_names: tuple[str, ...]
@@ -85,6 +92,9 @@ class ArmShape(NamedTuple):
     """(f,) positions of the open gripper's joints"""
     opening_m: float
     """Free gap of the open gripper, in m; 0 without a gripper"""
+    limits: JointLimits
+    sigma_rad: float = 0.0
+    """Standard deviation of a joint's reading"""
 
 
 class _LastCommand(NamedTuple):
@@ -109,6 +119,9 @@ class DriverSession:
         self._heard_s = self._measured_s = -math.inf
         self._sequence = -1
         self._clock = DriverClock()
+        self._plausibility = Plausibility(shape.joint_names, shape.limits, shape.sigma_rad)
+        self._doubt: str | None = None
+        self._doubted_s = -math.inf
         self._closing = (0.0, -math.inf)
         self._last_command = _LastCommand((0.0,) * len(shape.joint_names), -math.inf)
         self._sent = self._sent_before = 0
@@ -122,19 +135,16 @@ class DriverSession:
         self._notes: list[str] = []
 
     @property
-    def present(self) -> bool:
-        """Whether a driver is connected"""
-        return self._peer is not None
+    def driver(self) -> bytes | None:
+        """Peer of the driver; None while none is connected"""
+        return self._peer
 
     def receive(self, peer: bytes, payload: bytes, received_s: float) -> None:
         """Take one message; an invalid message is rejected as a whole, counted and reported."""
-        if self._peer not in (None, peer):
-            self._reject(
-                "second",
-                "a second driver sends, while the first one still does; valid: one driver at a time",
-                peer,
-                received_s,
-            )
+        silent_s = received_s - self._heard_s
+        if self._peer not in (None, peer) or (self._last_peer not in (None, peer) and silent_s <= TAKEN_OVER_S):
+            why = f"a second driver sends, {silent_s:.2f} s after the first one did; valid: after {TAKEN_OVER_S:g} s"
+            self._reject("second", why, peer, received_s)
             return
         try:
             said = decoded(payload, _DECODER, DRIVER_VERSION)
@@ -152,10 +162,13 @@ class DriverSession:
         """Forget a silent driver, so that another may connect; call this after `receive` of all arrived messages."""
         if self._peer is not None and now_s - self._heard_s > SILENT_S:
             self._peer = None
-        if self.present is not self._told_present and now_s - self._told_s >= _NEWS_PERIOD_S:
-            self._told_present, self._told_s = self.present, now_s
+        if self._doubt is not None and now_s - self._doubted_s > _DOUBTED_S:
+            self._doubt_states(None, now_s)
+        present = self._peer is not None
+        if present is not self._told_present and now_s - self._told_s >= _NEWS_PERIOD_S:
+            self._told_present, self._told_s = present, now_s
             gone = f"arm lost: nothing heard from the driver for {now_s - self._heard_s:.2f} s"
-            self._notes.append("driver: connected" if self.present else gone)
+            self._notes.append("driver: connected" if present else gone)
 
     def command(self, velocities_rad_s: FloatArray, until_s: float) -> None:
         """Store the arm's command for `outgoing`; until_s: when it expires, on our clock.
@@ -225,22 +238,28 @@ class DriverSession:
             # A driver that returns after a silence keeps its clock, so that its earlier messages count as old.
             if self._last_peer != peer or said.sequence <= self._sequence:
                 self._begin(said.sequence)
+            if self._last_peer not in (None, peer):
+                self._doubt_states("another driver drives the arm now: look where it is", received_s)
+                self._notes.append("driver: another one has taken over")
             self._peer = self._last_peer = peer
         if said.sequence <= self._sequence:
             why = f"sequence = {said.sequence}; valid: above that of the message before, {self._sequence}"
             self._reject("order", why, peer, received_s)
             return
+        since_s = received_s - self._heard_s
         self._heard_s, self._sequence = received_s, said.sequence
         ours = said.echo_s is not None and self._first_sent_s <= said.echo_s <= received_s
         echoed = (said.echo_s, said.held_s) if ours and said.echo_s is not None else None
         if not self._clock.update(said.sent_s, received_s, echoed):
             self._clock = DriverClock()
-            self._reject(
-                "clock",
-                "the driver's clock jumped, or echo_s and held_s are not from our commands",
-                peer,
-                received_s,
-            )
+            self._plausibility.new_clock(said.measured_s, since_s)
+            why = "the driver's clock jumped, or echo_s and held_s are not from our commands"
+            self._reject("clock", why, peer, received_s)
+            return
+        positions, velocities = floats(said.joint_positions), floats(said.joint_velocities)
+        if (fault := self._plausibility.fault(said.measured_s, positions, velocities)) is not None:
+            self._doubt_states(f"the driver's states cannot be true: {fault}", received_s)
+            self._reject("impossible", fault, peer, received_s)
             return
         if not self._clock.known:
             if self._sent - self._sent_before > _UNANSWERED:
@@ -254,17 +273,25 @@ class DriverSession:
         shape, fingers = self._shape, said.finger_positions
         self.state = ArmState(
             time_s=self._measured_s,
-            joint_positions_rad=floats(said.joint_positions),
-            joint_velocities_rad_s=floats(said.joint_velocities),
+            joint_positions_rad=positions,
+            joint_velocities_rad_s=velocities,
             finger_positions=shape.open_fingers if fingers is None else floats(fingers),
             gripper_opening_m=shape.opening_m if said.opening_m is None else said.opening_m,
             gripper_holding=said.holding,
             joint_loads_nm=None if said.joint_loads is None else floats(said.joint_loads),
+            doubt=self._doubt,
         )
 
     def _begin(self, sequence: int) -> None:
         """Begin with a new driver; sequence: number of its first message."""
         self._clock, self._sequence, self._sent_before = DriverClock(), sequence - 1, self._sent
+        self._plausibility.restart()
+
+    def _doubt_states(self, why: str | None, now_s: float) -> None:
+        """Doubt the states for a while, for the first reason meanwhile; None: believe them again."""
+        self._doubt, self._doubted_s = why and (self._doubt or why), now_s
+        if self.state is not None:
+            self.state = replace(self.state, doubt=self._doubt)
 
     def _reject(self, why: Why, text: str, peer: bytes, now_s: float) -> None:
         self.rejected[why] += 1

@@ -63,10 +63,12 @@ def test_a_state_comes_back_bit_for_bit(
     joints: list[float], fingers: list[float], time_s: float, holding: bool, measures: bool
 ) -> None:
     values = np.array(joints)
-    loads, simulated_s = (2.0 * values, 0.5 * time_s) if joints and measures else (None, None)
-    state = ArmState(time_s, values, -values, np.array(fingers), 0.1, holding, loads, simulated_s)
+    loads, simulated_s = (0.5 * values, 0.5 * time_s) if joints and measures else (None, None)
+    doubt = "joint 1 (élbow)" if measures else None
+    state = ArmState(time_s, values, -values, np.array(fingers), 0.1, holding, loads, simulated_s, doubt)
     found = unpack_state(pack_state(state))
     assert (found.time_s, found.gripper_opening_m, found.gripper_holding) == (time_s, 0.1, holding)
+    assert found.doubt == doubt
     assert found.simulated_s == simulated_s
     for name in ("joint_positions_rad", "joint_velocities_rad_s", "finger_positions", "joint_loads_nm"):
         assert same_bits(getattr(found, name), getattr(state, name))

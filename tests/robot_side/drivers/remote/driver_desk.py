@@ -9,11 +9,13 @@ from typing import Any
 import msgpack
 import numpy as np
 
+from robot_side.arm.ability import JointLimits
 from robot_side.arm.port import ArmState
 from robot_side.drivers.remote.arm import RemoteArm
 from robot_side.drivers.remote.driver_session import ArmShape
 
-SHAPE = ArmShape(("shoulder", "elbow"), ("finger",), np.array([0.04]), 0.08)
+LIMITS = JointLimits(np.full(2, 2.0), np.full(2, 8.0))
+SHAPE = ArmShape(("shoulder", "elbow"), ("finger",), np.array([0.04]), 0.08, LIMITS)
 TICK_S = 0.001
 AHEAD_S = 1000.0
 """Seconds by which the driver's clock is ahead of ours"""

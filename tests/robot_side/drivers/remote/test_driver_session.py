@@ -6,11 +6,14 @@ from typing import Any
 import msgpack
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
-from robot_side.arm.ability import JointLimits
 from robot_side.arm.following import Following
 from robot_side.arm.joint_estimate import lateness_s
-from tests.robot_side.drivers.remote.driver_desk import AHEAD_S, SHAPE, TICK_S, DriverDesk
+from robot_side.drivers.remote.driver_session import TAKEN_OVER_S
+from robot_side.operators.safety import SafetySettings
+from tests.robot_side.drivers.remote.driver_desk import AHEAD_S, LIMITS, SHAPE, TICK_S, DriverDesk
 
 
 @pytest.mark.parametrize("delay_s", [0.0, 0.02])
@@ -63,7 +66,7 @@ def test_a_silent_driver_is_told_nothing_more_and_ages() -> None:
     desk.run(0.3, velocity=0.4)
     assert desk.age_s() == pytest.approx(0.3, abs=0.02)
     assert any(note.startswith("arm lost: nothing heard from the driver for 0.1") for note in desk.notes)
-    assert not desk.arm.session.present
+    assert desk.arm.session.driver is None
 
 
 def test_a_driver_that_was_stopped_goes_on_and_what_it_said_before_is_known_to_be_old() -> None:
@@ -120,6 +123,51 @@ def test_a_second_driver_is_refused_and_hears_why() -> None:
     assert desk.arm.session.rejected == {"second": 1}
     assert "second" in desk.refused[0]
     assert desk.arm.state(desk.now_s).joint_positions_rad == pytest.approx(0.0)
+
+
+@pytest.mark.parametrize(("pause_s", "taken"), [(0.15, False), (0.95, False), (1.05, True)])
+def test_a_second_driver_takes_over_only_after_a_second_and_that_is_told(pause_s: float, taken: bool) -> None:
+    desk = DriverDesk()
+    desk.run(1.5)
+    desk.speaks = False
+    desk.run(pause_s)
+    desk.say(b"second", echo_s=None, held_s=0.0, joint_positions=[1.0, 0.0])
+    desk.run(0.002)
+    assert desk.arm.session.rejected == ({} if taken else {"second": 1})
+    doubt = desk.arm.state(desk.now_s).doubt
+    assert doubt == ("another driver drives the arm now: look where it is" if taken else None)
+    assert ("driver: another one has taken over" in desk.notes) is taken
+    desk.speaks = True
+    desk.run(0.3)
+    # The first one goes on at once, or is now the second.
+    assert (desk.arm.session.rejected["second"] > 5) is taken
+    assert taken or desk.age_s() < 0.02
+
+
+@given(
+    st.lists(st.tuples(st.booleans(), st.booleans(), st.sampled_from([0.01, 0.09, 0.3, 0.95, 1.1])), max_size=5),
+    st.sampled_from([0.05, 0.1, 0.99]),
+)
+@settings(max_examples=20)
+def test_nobody_is_armed_when_another_driver_takes_over(talks: list[tuple[bool, bool, float]], arm_s: float) -> None:
+    """The arm is lost in the turn that lets another driver in, or before, as long as `arm_s` may be."""
+    safety = SafetySettings(arm_s=arm_s)
+    desk, driver = DriverDesk(), b"driver"
+    desk.run(0.3)
+    for first, second, lasts_s in talks:
+        desk.speaks = first
+        for tick in range(round(lasts_s / TICK_S)):
+            before, lost = driver, desk.age_s() > safety.arm_s
+            if second and tick % 5 == 0:
+                desk.say(b"second")
+            desk.run(TICK_S)
+            driver = desk.arm.session.driver or driver
+            assert driver == before or lost
+
+
+def test_a_state_may_not_be_so_old_that_another_driver_could_come_while_armed() -> None:
+    with pytest.raises(ValueError, match=r"arm_s = 1\.0; valid: above 0 and below 1"):
+        SafetySettings(arm_s=TAKEN_OVER_S)
 
 
 @pytest.mark.parametrize(
@@ -222,7 +270,7 @@ def test_a_driver_that_loses_commands_is_noticed(
     desk = Careless(delay_s, period_s=period_s)
     desk.run(0.5)
     desk.keeps, desk.briefly = (keeps or 10**9), briefly
-    following = Following(JointLimits(np.full(2, 2.0), np.full(2, 8.0)), SHAPE.joint_names)
+    following = Following(LIMITS, SHAPE.joint_names)
     said = set()
     for tick in range(1300):
         velocity = 0.4 if tick > 100 else 0.0
