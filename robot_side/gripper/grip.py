@@ -41,7 +41,10 @@ class Grip:
         """
         if state.gripper_holding:
             self._held_s = state.time_s
-        if self.held is not None and state.time_s - self._held_s > _LET_GO_S:
+        if self.held is not None and (
+            state.time_s - self._held_s > _LET_GO_S or objects.names[self.held.index] != self.held.name
+        ):
+            # Released, or forgotten by who perceives it: then its index is another object's.
             self.let_go()
         elif self.held is None and state.gripper_holding:
             index = gripped_object(self._surroundings.see(objects), pose.tool_position_m, state.gripper_opening_m)

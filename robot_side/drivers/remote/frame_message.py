@@ -1,6 +1,7 @@
 """Message of a perception process to the robot side (docs/drivers.md), and its conversion to a frame of objects."""
 
 import math
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from typing import Annotated, Any, Final
 
@@ -75,10 +76,10 @@ def require_possible(frame: ObjectFrame) -> None:
     """Raise ValueError for a repeated name, no or several shapes, a wrong quaternion, or `taken_s` after `sent_s`."""
     if frame.taken_s > frame.sent_s:
         raise ValueError(f"taken_s = {frame.taken_s}; valid: up to sent_s = {frame.sent_s}")
-    names = [thing.name for thing in frame.objects]
+    names = Counter(thing.name for thing in frame.objects)
     for thing in frame.objects:
-        if names.count(thing.name) > 1:
-            raise ValueError(f"{thing.name!r} occurs {names.count(thing.name)} times; valid: once")
+        if names[thing.name] > 1:
+            raise ValueError(f"{thing.name!r} occurs {names[thing.name]} times; valid: once")
         shapes = sum(bool(getattr(thing, shape)) for shape in SHAPES)
         if shapes != 1:
             raise ValueError(f"{thing.name!r} has {shapes} shapes; valid: exactly one of {', '.join(SHAPES)}")

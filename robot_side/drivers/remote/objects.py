@@ -42,7 +42,10 @@ class RemoteObjects:
         self._sequence = -1
         self._heard_s = self._taken_s = self._refused_s = -math.inf
         self._frame: PerceivedObjects | None = None
-        self._known: dict[str, SeenObject] = {}
+        self._known: list[SeenObject] = []
+        """Each object as it was seen last, at its index in the frames"""
+        self._last_seen: dict[str, int] = {}
+        """Number of the frame that had each known object last"""
         self._said: set[str] = set()
         self._is_old = False
 
@@ -99,22 +102,37 @@ class RemoteObjects:
     def _take(self, frame: ObjectFrame, received_s: float) -> None:
         """Take a frame; ValueError if it is invalid."""
         require_possible(frame)
-        # An object keeps its index; a missing one has no shape but keeps its name, as it may be held.
-        known = self._known | {thing.name: thing for thing in frame.objects}
-        if len(known) > MOST_OBJECTS:
-            raise ValueError(
-                f"{len(known)} names of objects have been sent; valid: up to {MOST_OBJECTS}, one name for each object"
-            )
-        present = {thing.name for thing in frame.objects}
-        roles = [self._role(thing) if thing.name in present else Role.IGNORED for thing in known.values()]
+        known, present = self._placed(frame), {thing.name for thing in frame.objects}
+        roles = [self._role(thing) if thing.name in present else Role.IGNORED for thing in known]
         taken_s = received_s - (frame.sent_s - frame.taken_s)
-        seen = perceived([*known.values()], roles, taken_s)
+        seen = perceived(known, roles, taken_s)
         require_valid(seen)
         self._known, self._frame, self._taken_s = known, seen, taken_s
+        names = {thing.name for thing in known}
+        self._last_seen = {name: number for name, number in self._last_seen.items() if name in names}
+        self._last_seen |= dict.fromkeys(present, self.accepted)
         widest = max(frame.objects, key=lambda thing: thing.sd_m, default=None)
         if widest is not None and widest.sd_m > self._sd_m:
             text = f"sd_m = {widest.sd_m} of {widest.name!r} is more than {self._sd_m}, which the law uses"
             self._report_once("sd", f"objects: {text}; to raise that: --camera.sd-m {widest.sd_m}")
+
+    def _placed(self, frame: ObjectFrame) -> list[SeenObject]:
+        """Return the known objects with those of the frame, each at its index.
+
+        A missing object has no shape but keeps its name and index, as it may be held. If there is no room, a new object
+        takes the index of the one that has been gone longest, whose name is forgotten.
+        """
+        seen = {thing.name: thing for thing in frame.objects}
+        placed = [seen.pop(thing.name, thing) for thing in self._known]
+        present = {thing.name for thing in frame.objects}
+        new = list(seen.values())
+        room = max(MOST_OBJECTS - len(placed), 0)
+        if len(new) > room:
+            gone = [index for index, thing in enumerate(placed) if thing.name not in present]
+            gone.sort(key=lambda index: self._last_seen[placed[index].name])
+            for index, thing in zip(gone, new[room:], strict=False):
+                placed[index] = thing
+        return placed + new[:room]
 
     def _role(self, thing: SeenObject) -> Role:
         return self._roles.get(thing.name) or thing.role or role_from_name(thing.name)
