@@ -1,5 +1,7 @@
 """Motion of the arm by the operator's commands."""
 
+from typing import Final
+
 import numpy as np
 
 from common.arrays import FloatArray
@@ -13,6 +15,8 @@ from robot_side.arm.tool_motion import ToolMotionSettings
 from robot_side.gripper.grip import Grip
 from robot_side.operators.safety import Permission
 from robot_side.tick.sensed import Sensed
+
+_CUT: Final = "too many things overlap at the gripper to be looked at: the triggers are stiff"
 
 
 class Motion:
@@ -75,6 +79,8 @@ class Motion:
             self.hindrance.end()
         if self.following.text is not None:
             self.hindrance.find(self.following.text)
+        if sensed is not None and sensed.cut:
+            self.hindrance.find(_CUT)
         self.commanded_rad_s = velocity
         self.rises_m_s = 0.0 if grip.held is None else float(pose.tool_jacobian[2] @ velocity)
         self._arm.command(velocity, permission.valid_until_s)

@@ -29,7 +29,7 @@ from robot_side.field.object_class import SKIPPED
 from robot_side.field.pairs import enter, pairs_of
 from robot_side.field.profile import follow
 from robot_side.field.samples import Profile
-from robot_side.field.scratch import SCRATCH, STRENGTHS, Bundles, Count, Error, ScratchColumns
+from robot_side.field.scratch import MOST_WORK, SCRATCH, STRENGTHS, Bundles, Count, Error, ScratchColumns
 from robot_side.surroundings.any_kind import contact
 from robot_side.surroundings.bounds import passes
 from robot_side.surroundings.kinds.layout import HALF_SPACE, MESH
@@ -49,6 +49,13 @@ def _last_to_count(scratch: ScratchColumns, margin: float) -> float:
     """Return the contact distance, lead subtracted, beyond which a contact changes no onset distance."""
     last: float = max(scratch.distances_m[0, STRENGTHS - 1], scratch.distances_m[1, STRENGTHS - 1])
     return last + margin
+
+
+@inlined
+def _within_budget(scratch: ScratchColumns, pairs: int) -> bool:
+    """Return whether the look may go on. pairs: those of the present object, which are not counted yet."""
+    within: bool = scratch.counts[Count.PAIRS] + pairs + scratch.counts[Count.OVERLAPS] <= MOST_WORK
+    return within
 
 
 @building_block
@@ -140,7 +147,7 @@ def _look_at(
         if bound <= far:
             item = -1 - cluster - (clusters if rough else 0)
             count = push(keys, items, count, _key(bound, lead, rough), item)
-    while count > 0 and keys[0] < _last_to_count(scratch, margin):
+    while count > 0 and keys[0] < _last_to_count(scratch, margin) and _within_budget(scratch, pairs):
         item, first = items[0], keys[0]
         count = drop_first(keys, items, count)
         last = min(far, _last_to_count(scratch, margin) + lead)
@@ -167,8 +174,10 @@ def _look_at(
                     pair = scratch.pairs[place]
                     count = push(keys, items, count, pair.contact - pair.lead, place)
                 pairs += met
-    for k in range(waiting):
-        _follow(bundles, items[items.size - 1 - k], rows, thing, along, reach, False)
+    last = items.size - waiting
+    while waiting > 0 and _within_budget(scratch, pairs):
+        _follow(bundles, items[last + waiting - 1], rows, thing, along, reach, False)
+        waiting -= 1
     scratch.counts[Count.PAIRS] += pairs
 
 
@@ -236,13 +245,16 @@ def look(
             rows, nearest = _near_rows(bundles, first, end, middle, size, along, reach + margin + lead)
             if rows > 0:
                 count = push(keys, things, count, nearest - lead if nearest > 0.0 else -math.inf, thing)
-    while count > 0 and keys[0] < _last_to_count(scratch, margin):
+    while count > 0 and keys[0] < _last_to_count(scratch, margin) and _within_budget(scratch, 0):
         thing = things[0]
         count = drop_first(keys, things, count)
         first, end, lead = scene.first_rows[thing], scene.first_rows[thing + 1], shorter
         lead += approach[thing] if moves else 0.0
         rows, _ = _near_rows(bundles, first, end, middle, size, along, reach + margin + lead)
         _look_at(bundles, spheres, rows, thing, classes[thing], lead, along, half_gap, reach)
+    if not _within_budget(scratch, 0):
+        # What was not looked at may be anywhere.
+        scratch.counts[Count.CUT], scratch.distances_m[:] = 1, 0.0
     for kind in range(2):
         soonest = math.inf
         for level in range(STRENGTHS - 1, -1, -1):

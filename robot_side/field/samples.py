@@ -5,7 +5,7 @@ from typing import Any, Final, NamedTuple
 
 from robot_side.compiled.kernel import building_block, inlined
 from robot_side.compiled.vectors import Vector, add, dot, scale
-from robot_side.field.scratch import SCRATCH, Bundles, Count, ScratchColumns
+from robot_side.field.scratch import MOST_WORK, SCRATCH, Bundles, Count, ScratchColumns
 from robot_side.surroundings.overlaps import overlap
 from robot_side.surroundings.scene_columns import SCENE, contact_in_front
 
@@ -42,7 +42,9 @@ def sample(profile: Profile, at: float, bundles: Bundles) -> tuple[Sample, float
     radius, overlap_gradient = profile.pair.radius, scratch.overlap_gradient
     center = add(profile.center, scale(at, profile.along))
     volume, gradient, may_rise = 0.0, (0.0, 0.0, 0.0), False
-    for k in range(profile.entries):
+    # Beyond the limit the look's result is discarded: the search only has to end.
+    entries = profile.entries if scratch.counts[Count.OVERLAPS] <= MOST_WORK else 0
+    for k in range(entries):
         entry = scratch.entries[k]
         if entry.enters > at:
             continue

@@ -27,6 +27,9 @@ contact plane; 0 for a mesh with dents. lead: distance by which all strengths be
 along the motion, the object's approach, and the inflation if the sphere is uninflated. touchable: 1 for an object that
 is to be touched. expected: D_σ(P) - D_σ(0.5) for such an object, else 0."""
 
+MOST_WORK: Final = 40_000
+"""Pairs that touch and computed overlaps after which a look is cut short: some 30 ms. A gripper that slides along solid
+things needs up to 16 000; only objects that overlap each other by the hundred need more."""
 ENTRY: Final = np.dtype(
     [
         ("row", np.int64),
@@ -51,6 +54,8 @@ class Count(IntEnum):
     """Computed overlaps of one sphere and one primitive"""
     LIMITED = 3
     """Spheres whose inflation was limited to half the gap between the fingers (§3.4)"""
+    CUT = 4
+    """1 if the look was cut short, as it had done more than `MOST_WORK`; all strengths then begin at once"""
 
 
 class Error(IntEnum):

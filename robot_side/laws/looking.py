@@ -9,7 +9,7 @@ import numpy as np
 from common.arrays import FloatArray, IntArray
 from common.protocol.around import PROBES
 from robot_side.field.field import Ahead, Field
-from robot_side.field.scratch import Count
+from robot_side.field.scratch import MOST_WORK, Count
 from robot_side.field.total_overlap import total_overlap_m3
 from robot_side.laws.around import RETREATS_M_S, ProbeLooks, probe
 from robot_side.laws.classes import Classes
@@ -64,13 +64,17 @@ class Looking:
     looks: int = 0
     with_nothing_near: int = 0
     """Looks in which no sphere touched an object within the examined distance"""
+    cut: Field | None = None
+    """Result of the newest tick's further looks, once its looks had done more than `MOST_WORK`; None if they had not"""
     work: IntArray = field(default_factory=lambda: np.zeros(len(Count), dtype=np.int64))
     """Counts of the looks' work, indexed by `Count`"""
     _next_overlap_s: float = -math.inf
+    _done: int = 0
 
     def look(self, seen: Seen, *, changed: bool) -> None:
         """Make the looks of one tick. changed: whether the situation has changed, or objects have moved."""
         situation, motion = seen.situation, seen.motion
+        self.cut, self._done = None, 0
         deflected, traced = situation.lateral != (0.0, 0.0), situation.compensation == "operator"
         for side in (R2, L2):
             leads = motion.ahead_m_s > -RETREATS_M_S if side == R2 else motion.ahead_m_s < RETREATS_M_S
@@ -103,7 +107,13 @@ class Looking:
     def _one(self, found: Prospect, seen: Seen) -> tuple[Field, FloatArray, float, FloatArray]:
         """Look; return the field, û, the tool's position along û, and the onset distances (2, 8) from the tool."""
         pose, classes, along, widest_m = found.asked
-        made = self.ahead.look(pose, seen.scene, classes, along, widest_m)
+        # What was too much is not tried again in the same tick.
+        made = self.cut or self.ahead.look(pose, seen.scene, classes, along, widest_m)
+        self._done += int(made.counts[Count.PAIRS] + made.counts[Count.OVERLAPS])
+        if self.cut is None and self._done > MOST_WORK:
+            cut = np.zeros_like(made.counts)
+            cut[Count.CUT] = 1
+            self.cut = Field(np.zeros_like(made.onsets_m), made.sigmas_m, cut)
         self.work += made.counts
         self.looks += 1
         self.with_nothing_near += int(made.counts[Count.PAIRS] == 0)
@@ -117,7 +127,8 @@ class Looking:
         self.sides[side].add(0, seen.now_s, direction, began_m, onsets_m)
         self.newest[side] = Newest(seen.now_s, direction, began_m, found.asked.along.reach_m, found.able, made.sigma_m)
         leads = side == (R2 if motion.ahead_m_s >= 0.0 else L2)
-        if leads and seen.now_s >= self._next_overlap_s:
+        # For display only, and as dear as the look that was cut short.
+        if leads and seen.now_s >= self._next_overlap_s and not made.counts[Count.CUT]:
             self._next_overlap_s = seen.now_s + _OVERLAP_PERIOD_S - _ROUNDING_S
             displacement_m = abs(motion.ahead_m_s) * seen.situation.loop_age_s * direction
             spheres = moved_and_inflated(seen.situation.pose, displacement_m, made.sigmas_m)

@@ -145,6 +145,7 @@ class SweptLaw:
             enlargement_m=motion.speed_m_s * age_s + leading.sigma_m,
             overlap_m3=looking.overlap_m3,
             tool_speed_m_s=motion.speed_m_s,
+            cut=looking.cut is not None,
         )
 
     def expect(self, probability: float) -> None:

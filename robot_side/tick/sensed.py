@@ -31,6 +31,8 @@ class Sensed:
     """Total overlap Σ V_ij of the enlarged gripper with all objects (eq. 11-12)"""
     tool_speed_m_s: float = 0.0
     """Speed |v| of the tool's point in any direction"""
+    cut: bool = False
+    """Whether there was too much to look at, so that all strengths begin at once"""
 
     def __post_init__(self) -> None:
         for name in ("speed_m_s", "horizon_m", "rumble", "enlargement_m", "overlap_m3", "tool_speed_m_s"):

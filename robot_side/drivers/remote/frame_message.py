@@ -97,15 +97,18 @@ def perceived(things: Sequence[SeenObject], roles: Sequence[Role], time_s: float
     positions = _rows(np.add(thing.position_m, thing.mean_m) for thing in things)
     arrays: dict[str, Any] = {name: [] for kind in KINDS for name in (*kind.parts, kind.owner)}
     for index, thing in enumerate(things):
-        kind, primitives = _primitives(thing, positions[index], turned[index])
-        for values in () if roles[index] is Role.IGNORED else primitives:
-            arrays[f"{kind}_object"].append(index)
-            for name, value in values.items():
-                arrays[name].append(value)
+        if roles[index] is Role.IGNORED:
+            continue
+        kind, count, values = _primitives(thing, positions[index], turned[index])
+        arrays[f"{kind}_object"] += [index] * count
+        for name, value in values.items():
+            arrays[name].append(value)
     for one in KINDS:
         arrays[one.owner] = np.array(arrays[one.owner], dtype=np.int64)
         for name, (_, shape) in one.parts.items():
-            arrays[name] = np.array(arrays[name], dtype=np.float64).reshape(-1, *shape)
+            # An object's tetrahedra, which may be a thousand, are one block.
+            blocks = [np.reshape(block, (-1, *shape)) for block in arrays[name]]
+            arrays[name] = np.concatenate(blocks, dtype=np.float64) if blocks else np.empty((0, *shape))
     return PerceivedObjects(
         time_s=time_s,
         names=tuple(thing.name for thing in things),
@@ -124,18 +127,18 @@ def _velocities(things: Sequence[SeenObject]) -> FloatArray | None:
     return _rows(thing.velocity_m_s or (0.0, 0.0, 0.0) for thing in things)
 
 
-def _primitives(thing: SeenObject, position: FloatArray, turned: FloatArray) -> tuple[str, list[dict[str, Any]]]:
-    """Return the kind of the object's shape, and the values of the frame's arrays for each of its primitives."""
+def _primitives(thing: SeenObject, position: FloatArray, turned: FloatArray) -> tuple[str, int, dict[str, Any]]:
+    """Return the kind of the object's shape, the number of its primitives, and their values in the frame's arrays."""
     if thing.sphere is not None:
-        return "sphere", [{"sphere_centers_m": position, "sphere_radii_m": thing.sphere}]
+        return "sphere", 1, {"sphere_centers_m": position, "sphere_radii_m": thing.sphere}
     if thing.tetrahedra is not None:
         corners = np.array(thing.tetrahedra) @ turned.T + position
-        return "tetrahedron", [{"tetrahedron_vertices_m": each} for each in corners]
+        return "tetrahedron", len(corners), {"tetrahedron_vertices_m": corners}
     if thing.half_space:
         normal = turned[:, 2] / np.linalg.norm(turned[:, 2])
-        return "half_space", [{"half_space_normals": normal, "half_space_offsets_m": normal @ position}]
+        return "half_space", 1, {"half_space_normals": normal, "half_space_offsets_m": normal @ position}
     kind, sizes, name = ("box", thing.box, "half_sizes") if thing.box else ("ellipsoid", thing.ellipsoid, "half_axes")
-    return kind, [{f"{kind}_centers_m": position, f"{kind}_rotations": turned, f"{kind}_{name}_m": sizes}]
+    return kind, 1, {f"{kind}_centers_m": position, f"{kind}_rotations": turned, f"{kind}_{name}_m": sizes}
 
 
 def _rows(values: Iterable[Any]) -> FloatArray:

@@ -15,7 +15,7 @@ from robot_side.enlargement.distance import Uncertainty
 from robot_side.enlargement.kinematic_error import directional_variance, position_covariance
 from robot_side.field.along import Along
 from robot_side.field.field import Ahead
-from robot_side.field.scratch import Count, Error
+from robot_side.field.scratch import MOST_WORK, Count, Error
 from tests.helpers.field.fields import AHEAD, RADIUS_M, along, ball_pose, look
 from tests.helpers.gripper_poses import free_pose, gripper_pose
 from tests.helpers.perceived_scenes import Scene, random_rotation, random_scene
@@ -118,6 +118,24 @@ def test_a_scene_of_many_far_things_is_as_quickly_told_as_one() -> None:
     found = look(gripper_pose(), wall.objects(), looked)
     np.testing.assert_array_equal(found.fast_m, expected.fast_m)
     assert found.counts[Count.OVERLAPS] == expected.counts[Count.OVERLAPS]
+
+
+def test_a_look_at_too_much_ends_soon_and_takes_all_for_near() -> None:
+    """500 boxes, or tetrahedra, that all overlap the gripper and each other cost no more than the limit, and a pair."""
+    rng, corners = (
+        np.random.default_rng(1),
+        np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]),
+    )
+    boxes, wedges = Scene(), Scene().add()
+    for _ in range(500):
+        boxes.add().box([*rng.uniform(-0.05, 0.05, 3)], rng.uniform(0.05, 0.2, 3))
+        wedges.tetrahedron(rng.uniform(-0.3, 0.3, 3) + 0.5 * (corners - 0.3))
+    for scene, most in ((boxes, 100), (wedges, 600)):
+        found = look(gripper_pose(), scene.objects(), along(AHEAD, 0.007, reach_m=0.3))
+        assert found.counts[Count.CUT] == 1
+        assert MOST_WORK < found.counts[Count.PAIRS] + found.counts[Count.OVERLAPS] <= MOST_WORK + most
+        assert not found.fast_m.any()
+        assert not found.slow_m.any()
 
 
 @pytest.mark.parametrize("name", ["tool_position_m", "tool_jacobian", "sphere_centers_m", "sphere_radii_m"])

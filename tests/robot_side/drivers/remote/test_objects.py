@@ -1,6 +1,7 @@
 """Objects that another process perceives and sends, in virtual time."""
 
 import math
+from dataclasses import replace
 from typing import Any
 from unittest.mock import patch
 
@@ -14,9 +15,12 @@ from common.errors import FeelaheadError
 from common.roles import Role
 from robot_side.drivers.remote import objects as objects_module
 from robot_side.drivers.remote.objects import RemoteObjects
+from robot_side.field.scratch import MOST_WORK
+from robot_side.parts import build_parts
 from robot_side.surroundings.perceived import PerceivedObjects
 from robot_side.surroundings.surroundings import Surroundings
 from robot_side.viewing.perceived_shapes import PerceivedModel
+from tests.robot_side.session_bench import QUICK, Bench
 
 CUP: dict[str, Any] = {"name": "cup", "sphere": 0.05, "position_m": [0.5, 0.0, 0.1]}
 CORNERS = [[[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.0, 0.1, 0.0], [0.0, 0.0, 0.1]]]
@@ -196,3 +200,32 @@ def test_what_is_drawn_follows_the_frames(scene: Any) -> None:
     assert (outward > 0.0).all()
     assert model.update(sender.says({"name": "wedge", "tetrahedra": CORNERS}))
     assert list(model.object_shapes(0)) == []
+
+
+@pytest.mark.parametrize("shape", ["box", "tetrahedra"])
+def test_objects_that_all_overlap_the_gripper_cost_no_more_than_the_limit_and_that_is_said(shape: str) -> None:
+    """Frames within the limits of the message, but of things that cannot be: turns stay short, and triggers stiff."""
+    parts = build_parts(QUICK, 1, "clock")
+    sender, rng = Sender(), np.random.default_rng(1)
+    bench = Bench(parts=replace(parts, camera=sender.objects))
+    place = {"position_m": [0.45, 0.0, 0.3]}
+    sender.says({"name": "far", "sphere": 0.1, "position_m": [9.0, 0.0, 0.0]})
+    operator = bench.join(2)
+    bench.cruise(operator)
+    assert bench.robot.status(bench.now_s).hindrance is None
+    if shape == "box":
+        things = [{"name": f"b{k}", "box": rng.uniform(0.1, 0.3, 3).tolist(), **place} for k in range(500)]
+    else:
+        corners = rng.uniform(-0.3, 0.3, (5, 1024, 4, 3)).tolist()
+        things = [{"name": f"t{k}", "tetrahedra": corners[k], **place} for k in range(5)]
+    sender.says(*things)
+    bench.drive(0.02, operator, r2=0.4)
+    before = bench.robot.parts.law.summary()
+    bench.drive(0.02, operator, r2=0.4)
+    after = bench.robot.parts.law.summary()
+    assert after["cut"] > before["cut"]
+    looks = after["fields"] - before["fields"]
+    assert sum(after[name] - before[name] for name in ("pairs", "overlaps")) <= looks * (MOST_WORK + 2000)
+    assert bench.state == "armed"
+    assert "too many things overlap" in str(bench.robot.status(bench.now_s).hindrance)
+    assert operator.updates[-1].r2.stiffness == 1.0
