@@ -159,3 +159,21 @@ def test_a_state_that_cannot_be_true_is_refused_and_doubted_for_half_a_second(li
     assert desk.arm.session.rejected["impossible"] >= 1
     desk.run(0.6)
     assert desk.arm.state(desk.now_s).doubt is None
+
+
+@pytest.mark.parametrize("jump_s", [-900.0, 900.0])
+@pytest.mark.parametrize(("lie", "doubted"), [(0.0, False), (0.5, True)])
+def test_a_drivers_clock_that_jumps_neither_excuses_a_jump_nor_is_one(
+    monkeypatch: pytest.MonkeyPatch, jump_s: float, lie: float, *, doubted: bool
+) -> None:
+    desk = DriverDesk()
+    desk.run(0.5)
+    desk.run(0.5, velocity=1.5)
+    clock = desk.drivers_s + jump_s - desk.now_s
+    monkeypatch.setattr(DriverDesk, "drivers_s", property(lambda self: self.now_s + clock))
+    desk.newest = None
+    while not desk.arm.session.rejected["clock"]:
+        desk.run(0.001, velocity=1.5)
+    desk.joints = desk.joints + lie
+    desk.run(0.1, velocity=1.5)
+    assert (desk.arm.session.rejected["impossible"] > 0) is doubted
