@@ -13,7 +13,7 @@ export PYTHONDONTWRITEBYTECODE :=
 
 # A file that is only half made is made again.
 .DELETE_ON_ERROR:
-.PHONY: audit figures demo mutants sbom test quick types test-kernel test-two-hosts wide-area test-containers test-console test-quiet pictures driving latency-experiment lock clean
+.PHONY: audit figures demo mutants sbom test quick types test-kernel test-two-hosts wide-area test-containers test-console test-quiet soak pictures driving latency-experiment lock clean
 
 PIP = $(BIN)/python -m pip install --disable-pip-version-check
 PIP_LOG = $(VENV)/pip.log
@@ -83,6 +83,10 @@ test-containers: $(VENV)/.installed ## both sides and the router in containers, 
 # Needs Chromium; in CI, root gets Debian's.
 test-console: $(VENV)/.installed $(VENV)/.kernels ## the console in a real browser, clicked through; its pictures: console-pictures
 	$(SUITE) -m "console and not quiet" tests/console $(ARGS)
+
+# With keys, on loopback; ARGS="--seconds 60 --simulated" is shorter, without the drivers' ports.
+soak: $(VENV)/.installed $(VENV)/.kernels ## every port under attack for ten minutes while an honest operator drives
+	$(BIN)/python -m tests.soak $(ARGS)
 
 # Before figures are published. What fails while other programs take a tenth of a processor is "not judged".
 test-quiet: $(VENV)/.installed $(VENV)/.kernels ## what is judged by milliseconds, of two hosts and the console: on an idle machine

@@ -15,8 +15,14 @@ ROLES = {"post": Role.OBSTACLE, "cup": Role.TARGET, "table": Role.SUPPORT}
 def sensed(
     enlargement_m: float, overlap_m3: float = 0.0, l2: int = 0, r2: int = 0, tool_speed_m_s: float = 0.0
 ) -> Sensed:
-    figures = {"enlargement_m": enlargement_m, "overlap_m3": overlap_m3, "tool_speed_m_s": tool_speed_m_s}
-    return Sensed(l2=uniform_field(l2), r2=uniform_field(r2), horizon_m=0.2, **figures)
+    return Sensed(
+        l2=uniform_field(l2),
+        r2=uniform_field(r2),
+        horizon_m=0.2,
+        enlargement_m=enlargement_m,
+        overlap_m3=overlap_m3,
+        tool_speed_m_s=tool_speed_m_s,
+    )
 
 
 def truth(
