@@ -18,8 +18,8 @@ from common.sockets.tcp_figures import peer_address
 
 BYTES_PER_S: Final = 64e6
 """Budget of a connection's bytes, if the caller has none: a perception's largest frames at 60 Hz"""
-PEER_LIMIT_PER_S: Final = 5000
-"""Maximum number of messages a second from one key, or without keys from one peer, as at the control port"""
+PEER_LIMIT_PER_S: Final = 2000
+"""Maximum number of messages a second from one key, or without keys from one peer: twice those of an arm at 1 kHz"""
 MOST_CONNECTIONS: Final = 64
 _HEARTBEAT_S: Final = 1.0
 _HANDSHAKE_S: Final = 5.0

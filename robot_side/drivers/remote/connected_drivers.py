@@ -15,8 +15,8 @@ from robot_side.drivers.remote.objects import RemoteObjects
 
 _TURN_S: Final = 0.004
 _STATES_BYTES_PER_S: Final = 4e6
-_FRAMES_BYTES_PER_S: Final = 64e6
-"""Budgets of a driver's states, 1000 a second, and of a perception's largest frames, 60 a second"""
+_FRAMES_BYTES_PER_S: Final = 16e6
+"""Budgets of a driver's states, 1000 a second, and of a perception, whose usual frames have some kilobytes"""
 _AWAITED: Final = {"--arm": "an arm's driver", "--objects": "a process that perceives objects"}
 
 
