@@ -1,15 +1,20 @@
 """Start and end of a companion process, in the process that starts it and in the companion."""
 
+import contextlib
+import math
 import signal
 import socket
 import subprocess
 import sys
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Final, Self
 
 from common.companion.channel import Channel
 
 _END_LIMIT_S: Final = 2.0
+_LOOK_S: Final = 0.25
+"""Time between two looks at whether a companion works, in seconds"""
 
 
 class Companion:
@@ -38,6 +43,7 @@ class Companion:
                 start_new_session=True,
             )
         self.channel = Channel(ours, room_bytes)
+        self._computed = "", ""
 
     @property
     def process_id(self) -> int:
@@ -60,20 +66,38 @@ class Companion:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def close(self, limit_s: float = _END_LIMIT_S) -> bool:
-        """Close the channel and wait at most `limit_s` for the companion to end, then kill it.
+    def works(self) -> bool:
+        """Return whether the companion computes, waits for a disk, or has computed since the last call.
+
+        One that is stopped, or waits for what never comes, does not.
+        """
+        try:
+            fields = Path(f"/proc/{self.process_id}/stat").read_text(encoding="utf-8").rpartition(")")[2].split()
+        except OSError:
+            return self.running  # a system without /proc
+        before, self._computed = self._computed, (fields[11], fields[12])
+        return fields[0] in "RD" or self._computed != before
+
+    def close(self, limit_s: float = _END_LIMIT_S, idle_s: float = math.inf) -> bool:
+        """Close the channel and wait for the companion to end; kill it after `limit_s`, or if it idles for `idle_s`.
 
         Return whether it ended by itself. Bytes in the send queue are lost; to send them first, call `channel.flush`
         until `channel.waiting` is 0.
         """
         self.channel.close()
-        try:
-            self._process.wait(limit_s)
-        except subprocess.TimeoutExpired:
-            self._process.kill()
-            self._process.wait()
-            return False
-        return True
+        idled_s = 0.0
+        while limit_s > 0.0 and idled_s < idle_s:
+            step_s = min(_LOOK_S, limit_s)
+            limit_s -= step_s
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                self._process.wait(step_s)
+                return True
+            idled_s = 0.0 if self.works() else idled_s + step_s
+        if self._process.poll() is not None:
+            return True
+        self._process.kill()
+        self._process.wait()
+        return False
 
 
 def companion_channel(arguments: Sequence[str], room_bytes: int = 1 << 23) -> tuple[Channel, list[str]]:

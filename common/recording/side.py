@@ -30,6 +30,8 @@ STATUS_PERIOD_S: Final = 0.1
 _READY_LIMIT_S: Final = 20.0
 _LEAVE_LIMIT_S: Final = 0.5
 _FINISH_LIMIT_S: Final = 20.0
+_IDLE_LIMIT_S: Final = 1.0
+"""Time for which a recorder may do nothing at the end, twice: one that hangs delays the end by 2 s"""
 _NOTHING: Final[Mapping[str, Any]] = {"kept_s": 0.0, "bytes": 0, "error": None}
 KILLED: Final = "the recorder was killed"
 
@@ -152,12 +154,18 @@ class SideRecording:
         self.idle(math.inf)
         _wait_until_sent(self._channel, _LEAVE_LIMIT_S)
         self._channel.send(END)
-        # A recorder of our own is waited for in any case; its last answer has the whole file's figures.
-        limit_s = _LEAVE_LIMIT_S if self._recorder is None else _FINISH_LIMIT_S
+        # A recorder of our own is waited for as long as it works; its last answer has the whole file's figures.
+        idled_s = waited_s = 0.0
         while "ended" not in self._said and not self._channel.ended:
-            if not select.select([self._channel], [], [], limit_s)[0]:
+            if idled_s >= _IDLE_LIMIT_S or waited_s >= _FINISH_LIMIT_S:
                 break
-            self._listen()
+            if select.select([self._channel], [], [], _LEAVE_LIMIT_S)[0]:
+                self._listen()
+            elif self._recorder is None:
+                break
+            else:
+                waited_s += _LEAVE_LIMIT_S
+                idled_s = 0.0 if self._recorder.works() else idled_s + _LEAVE_LIMIT_S
         if self._recorder is None:
             self._channel.close()
         else:
@@ -216,7 +224,11 @@ class RecorderProcess:
     def close(self) -> None:
         """Close our channel and wait for the process, which ends once all channels are closed."""
         # On a busy machine it may still have much to write: killing it would lose the end of the run.
-        self._companion.close(_FINISH_LIMIT_S)
+        self._companion.close(_FINISH_LIMIT_S, _IDLE_LIMIT_S)
+
+    def works(self) -> bool:
+        """Return whether the process does anything, as Companion.works does."""
+        return self._companion.works()
 
 
 def connect(path: Path) -> tuple[Channel, RecorderProcess | None]:

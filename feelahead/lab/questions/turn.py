@@ -49,6 +49,7 @@ _START_S: Final = 600.0
 _ARMED_S: Final = 600.0
 _END_S: Final = 120.0
 """Time in seconds after which a side that does not end is killed: the machine may be busy"""
+_DOOR: Final = b"sockets.door.keeper"
 _SETTLING_S: Final = 4.0
 """Time from the link, or from arming, to the measurement, in seconds: a machine that is too slow needs as long"""
 _THROTTLE_S: Final = 0.05
@@ -166,6 +167,12 @@ def _processor_s(process: int) -> float:
     return (int(fields[11]) + int(fields[12])) / float(os.sysconf("SC_CLK_TCK"))
 
 
+def _door_of(process: int) -> int | None:
+    """Return the process that owns a robot side's ports; None in versions without one."""
+    children = Path(f"/proc/{process}/task/{process}/children").read_text(encoding="utf-8").split()
+    return next((int(each) for each in children if _DOOR in Path(f"/proc/{each}/cmdline").read_bytes()), None)
+
+
 def run(cell: Case, seed: int) -> Iterator[Row]:
     """Run both sides once; yield a row with the figures of both."""
     with _started(cell, seed) as pair:
@@ -174,9 +181,11 @@ def run(cell: Case, seed: int) -> Iterator[Row]:
         time.sleep(_SETTLING_S)
         for side in sides:
             side.events()
-        began_s, before = time.monotonic(), [_processor_s(side.process_id) for side in sides]
+        door = _door_of(pair.robot.process_id)
+        processes = [*(side.process_id for side in sides), *([] if door is None else [door])]
+        began_s, before = time.monotonic(), [_processor_s(process) for process in processes]
         time.sleep(cell.seconds)
-        after, ended_s = [_processor_s(side.process_id) for side in sides], time.monotonic()
+        after, ended_s = [_processor_s(process) for process in processes], time.monotonic()
         statuses = [[one for one in side.events() if one["event"] == "status"] for side in sides]
         for side in sides:
             side.interrupt()
@@ -190,6 +199,7 @@ def run(cell: Case, seed: int) -> Iterator[Row]:
     yield {
         "robot_share": shares[0],
         "operator_share": shares[1],
+        "door_share": None if door is None else shares[2],
         "armed": float(np.mean([one.get("state") == "armed" for one in statuses[1]])) if statuses[1] else None,
         "stops": len(robot["stops"]),
         **figures,
@@ -219,6 +229,7 @@ def _figures(summary: dict[str, Any], side: str, statuses: list[dict[str, Any]])
 
 _TIMES: Final = {
     "robot_share": "robot, of a core",
+    "door_share": "its door, of a core",
     "operator_share": "operator, of a core",
     "robot_period_ms": "period, ms",
     "robot_missed": "missed",

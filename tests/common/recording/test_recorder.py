@@ -104,6 +104,19 @@ def test_a_deleted_file_stops_the_recording_and_nothing_is_said_to_be_kept(tmp_p
     assert recording.close() == {"dropped_blocks": 0, "kept_s": 0.0, "bytes": 0, "error": "the file was deleted"}
 
 
+def test_a_recorder_that_stands_still_is_ended_and_what_it_had_written_stays(tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    recording = recording_to(path)
+    note_until(recording, lambda: kept_s(recording) > 0.0)
+    assert recording._recorder is not None
+    process_id = recording._recorder.process_id
+    os.kill(process_id, signal.SIGSTOP)
+    recording.close()
+    with pytest.raises(ProcessLookupError):
+        os.kill(process_id, 0)
+    assert numbers(path)
+
+
 def test_two_sides_share_one_file(tmp_path: Path) -> None:
     path, place = tmp_path / "run.mcap", tmp_path / "recorder"
     recorder = RecorderProcess(path, place)

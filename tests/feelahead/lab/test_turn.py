@@ -29,6 +29,7 @@ def test_real_sides_are_measured(version: str) -> None:
     (found,) = run(Case("aside", version, "5ms", 2.0), 0)
     assert 0.0 < found["robot_share"] < 1.0
     assert 0.0 < found["operator_share"] < 1.0
+    assert 0.0 < found["door_share"] < 1.0
     assert found["loop_age_ms"] > 0.0
     # Another version is not told the period.
     assert found["robot_period_ms"] >= (5.0 if version == "this" else 4.0)
