@@ -18,6 +18,7 @@ import socket
 import struct
 import sys
 import threading
+from collections.abc import Iterator
 from itertools import islice
 from pathlib import Path
 from typing import Any, Final
@@ -59,6 +60,7 @@ class _Process:
     """Console process. After the start, everything runs in the server's thread."""
 
     def __init__(self, channel: Channel) -> None:
+        self._skipped = 0
         self._channel = channel
         self._facts: OperatorFacts | None = None
         self._shapes: SceneShapes | None = None
@@ -136,7 +138,8 @@ class _Process:
             for message in self._channel.receive():
                 state = self._take(message[:1], message[1:]) or state
             if state is not None:
-                self._show_scene(state)
+                with self._skipping():
+                    self._show_scene(state)
         except Exception as error:  # it would recur with every message
             self._give_up(f"the console failed: {error!r}")
             self._ended.set()
@@ -161,9 +164,22 @@ class _Process:
             lasting = {"kind": _LASTING[kind], **msgspec.msgpack.decode(content)}
             self._pages.show(_LASTING[kind], msgspec.json.encode(lasting).decode(), lasting=True)
         elif kind == b"v":
-            with contextlib.suppress(RemoteProtocolError):
+            with self._skipping():
                 return self._view(content)
         return None
+
+    @contextlib.contextmanager
+    def _skipping(self) -> Iterator[None]:
+        """Skip a view message that cannot be shown, and say so once: the robot side is a stranger here."""
+        try:
+            yield
+        except RemoteProtocolError:
+            pass
+        except Exception as error:
+            if not self._skipped:
+                text = f"a view of the robot side cannot be shown, and is skipped: {error!r}"
+                self._pages.note(msgspec.json.encode({"kind": ShownKind.NOTE, "text": text}).decode())
+            self._skipped += 1
 
     def _view(self, payload: bytes) -> SceneState | None:
         seen: AnyViewMessage | None = decode_view(payload)

@@ -1,5 +1,7 @@
 """Whatever a robot side sends as a scene is drawn or refused: nothing of it ends the console."""
 
+import contextlib
+import socket
 import struct
 from types import SimpleNamespace
 from typing import Any, get_args
@@ -10,6 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from common.companion.channel import Channel
 from common.errors import RemoteProtocolError
 from common.protocol.codec import decode_view, encode
 from common.protocol.messages import Header
@@ -120,3 +123,20 @@ def test_any_scene_that_is_decoded_is_drawn(data: st.DataObject) -> None:
             seen = process._view(encode(state))
             assert isinstance(seen, SceneState)
             process._show_scene(seen)
+
+
+def test_a_view_that_cannot_be_shown_is_skipped_and_said_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    one, other = socket.socketpair()
+    notes: list[str] = []
+
+    def fail(_: bytes) -> None:
+        raise ValueError("of no kind that was thought of")
+
+    with contextlib.closing(Channel(one)) as channel, other:
+        process = _Process(channel)
+        monkeypatch.setattr(process, "_pages", SimpleNamespace(note=notes.append))
+        monkeypatch.setattr(process, "_view", fail)
+        assert [process._take(b"v", b"") for _ in range(3)] == [None] * 3
+    [note] = notes
+    assert "skipped: ValueError" in note
+    assert process._skipped == 3
