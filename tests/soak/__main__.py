@@ -107,7 +107,7 @@ def main() -> int:
         robot.wait_for("listening", 300.0)
         connection = [f"--connect={ports['--bind']}", f"--view-connect={ports['view']}", f"--keys={folder / 'anna'}"]
         connection += [f"--robot-key={public}", "--device=simulated", "--no-console"]
-        operator = stack.enter_context(SideProcess("operator_side", "operator", connection))
+        operator = stack.enter_context(SideProcess("tests.soak.patient_operator", "operator", connection))
         quiet = watch(robot, operator, _SETTLES_S)
         for number, (kind, port, role) in enumerate(ATTACKS):
             if port in ports and kind not in asked.without:
