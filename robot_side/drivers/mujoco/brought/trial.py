@@ -1,5 +1,6 @@
 """Trial of a model that somebody brought: what MuJoCo's compiler takes for a small file, nothing else bounds."""
 
+import contextlib
 import ctypes
 import os
 import resource
@@ -104,8 +105,10 @@ def _compile_and_leave(path: Path, writing: int) -> NoReturn:
         resource.setrlimit(resource.RLIMIT_DATA, (held + _MOST_BYTES, held + _MOST_BYTES))
         resource.setrlimit(resource.RLIMIT_CPU, (_MOST_CPU_S, _MOST_CPU_S + 1))
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+        warnings.simplefilter("ignore")  # they come again when the caller compiles
         model: Any = mujoco.MjSpec.from_file(str(path)).compile()
-        mujoco.mj_forward(model, mujoco.MjData(model))
+        with contextlib.suppress(mujoco.FatalError):  # what it cannot simulate, the caller says in better words
+            mujoco.mj_forward(model, mujoco.MjData(model))
     except MemoryError:
         why = _TOO_LARGE.format(_MOST_BYTES >> 30)
     except BaseException as error:  # whatever it is, this process ends here
