@@ -98,7 +98,9 @@ class RobotTurns:
             for text in process.recording.idle(now_s, lambda: self._status(now_s)):
                 process.note(text)
         if self._audit is not None:
-            self._audit.look(self._core.session, self._door.take_events())
+            lost = self._audit.look(self._core.session, self._door.take_events())
+            if lost is not None:
+                process.note(lost)
         self._sending.push(self._reporter.due(now_s), now_s)
         if process.status.due(now_s):
             process.status.show(now_s, robot=replace(self._status(now_s), **self._times.paced()))

@@ -6,6 +6,7 @@ A thread writes, so that no turn waits for a disk. Of a process that is killed, 
 import json
 import os
 import queue
+import stat
 import threading
 from collections.abc import Callable
 from itertools import pairwise
@@ -28,13 +29,18 @@ class AuditLog:
         """wall_s: time since 1970. ConfigurationError if the file cannot be written."""
         self.failed = 0
         """Number of events that are not in the file, because the disk refused, or was too slow"""
+        self._told = False
         self._path, self._wall_s, self._largest_bytes = path, wall_s, largest_bytes
         try:
-            os.close(self._opened())
+            descriptor = self._opened()
+            regular = stat.S_ISREG(os.fstat(descriptor).st_mode)
+            os.close(descriptor)
         except OSError as error:
             raise ConfigurationError(
                 f"--audit {path}: cannot be written: {error.strerror}; valid: a file of this user, not a link"
             ) from error
+        if not regular:
+            raise ConfigurationError(f"--audit {path}: is no regular file; valid: a file of this user")
         self._waiting: queue.Queue[bytes | None] = queue.Queue(_WAITING)
         self._thread = threading.Thread(target=self._write_on, daemon=True, name="audit")
         self._thread.start()
@@ -47,6 +53,11 @@ class AuditLog:
         except queue.Full:
             self.failed += 1
 
+    def take_failure(self) -> bool:
+        """Return whether an event was lost for the first time since the last call."""
+        new, self._told = self.failed > 0 and not self._told, self.failed > 0
+        return new
+
     def close(self) -> None:
         """Write what waits, within half a second."""
         if self._thread.is_alive():
@@ -54,7 +65,8 @@ class AuditLog:
             self._thread.join(_END_S)
 
     def _opened(self) -> int:
-        return os.open(self._path, os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC, 0o600)
+        flags = os.O_APPEND | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC | os.O_NONBLOCK
+        return os.open(self._path, os.O_WRONLY | flags, 0o600)
 
     def _write_on(self) -> None:
         while (line := self._waiting.get()) is not None:

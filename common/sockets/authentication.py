@@ -152,7 +152,8 @@ class Authenticator:
             return [b"1.0", request, b"200", b"", key.encode(), b""]
         self.refused += 1
         is_new = key not in self._refused_keys and key not in self._allowed.barred
-        if is_curve and is_new and len(self._refused_keys) < _REMEMBERED_REFUSALS:
+        room = len(self._refused_keys) < _REMEMBERED_REFUSALS or key in self._allowed.names
+        if is_curve and is_new and room:
             self._refused_keys[key] = True
             self.refusals.append((key, question[3].decode("ascii", "replace")))
         return [b"1.0", request, b"400", b"not allowed", b"", b""]

@@ -23,6 +23,8 @@ PEER_LIMIT_PER_S: Final = 2000
 MOST_CONNECTIONS: Final = 64
 _HEARTBEAT_S: Final = 1.0
 _HANDSHAKE_S: Final = 5.0
+_SILENT_S: Final = 30.0
+"""Time after which a connection that has said nothing is ended, in seconds; one that sends later connects again"""
 
 
 class Received(NamedTuple):
@@ -77,8 +79,8 @@ class DriverPort(SocketShell):
             self._part.setsockopt(zmq.ROUTER_HANDOVER, 1)
             if keys is not None:
                 keys.secure(self._part)
-            held = MOST_CONNECTIONS, _HANDSHAKE_S, CONTROL_UNSENT_BYTES
-            self._ports = Gates([Gate(self._context, self._part, *held, bytes_per_s)])
+            held = MOST_CONNECTIONS, _SILENT_S, CONTROL_UNSENT_BYTES
+            self._ports = Gates([Gate(self._context, self._part, *held, bytes_per_s, (1 << 16) + 2 * limit_bytes)])
             bind_socket(self._part, endpoint, flag)
             self._inbox = Inbox(self._part, frames=2)
             self.endpoint = self._part.getsockopt_string(zmq.LAST_ENDPOINT)
@@ -117,12 +119,16 @@ class DriverPort(SocketShell):
     def refresh_keys(self) -> list[str]:
         """Read the allow-list again; return a line for each unknown key that was newly refused.
 
-        Call it before other sockets with the same allow-list refresh it.
+        Other sockets with the same allow-list are told of revoked keys by nobody: refresh it once for all.
         """
-        if self._keys is None or self._authenticator is None:
+        if self._keys is None:
             return []
         self._keys.allowed.refresh()
-        return self._authenticator.news()
+        return self.news()
+
+    def news(self) -> list[str]:
+        """Return a line for each unknown key that was newly refused since the last call."""
+        return [] if self._authenticator is None else self._authenticator.news()
 
     def wait(self, timeout_s: float) -> float:
         """Wait for a message, at most `timeout_s`; return the time on our monotonic clock."""
@@ -133,7 +139,7 @@ class DriverPort(SocketShell):
         """End connections beyond their budget of bytes; return the heaviest one's bytes since the last call, and its
         address."""
         self.crowded += self._ports.update(now_s)
-        size, descriptor = self._ports.cut_off(now_s)
+        size, descriptor, _ = self._ports.cut_off(now_s)
         return size, peer_address(descriptor)
 
     def present(self) -> dict[bytes, tuple[str, str]]:

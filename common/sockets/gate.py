@@ -29,14 +29,16 @@ class Gate:
         introduced_s: float,
         unsent_bytes: int,
         bytes_per_s: float,
+        first_bytes: int = 1 << 16,
     ) -> None:
         """Allow `most` connections, but no more than a quarter of the descriptors that this process may open.
 
-        `introduced_s`: as in PortConnections. `unsent_bytes`: as in hold_little. `bytes_per_s`: budget of each.
+        `introduced_s`: as in PortConnections. `unsent_bytes`: as in hold_little. `bytes_per_s`: budget of each;
+        `first_bytes`: of one that has not been introduced, in all.
         """
         self.heavy = 0
         """Number of connections that were ended because they sent too many bytes"""
-        self._traffic = Traffic(bytes_per_s)
+        self._traffic, self._first_bytes = Traffic(bytes_per_s), first_bytes
         self._part = part
         self._unsent_bytes = unsent_bytes
         self.connections = PortConnections(min(most, resource.getrlimit(resource.RLIMIT_NOFILE)[0] // 4), introduced_s)
@@ -59,15 +61,25 @@ class Gate:
             self.connections.ended(event["value"])
         return True
 
-    def cut_off(self, now_s: float) -> tuple[int, int]:
-        """End connections beyond their budget; return the heaviest one's bytes since the last call, and descriptor."""
+    def cut_off(self, now_s: float) -> tuple[int, int, list[int]]:
+        """End connections beyond their budget.
+
+        Return the heaviest one's bytes since the last call and its descriptor, and the descriptors that were ended.
+        """
         descriptors = {number: descriptor for descriptor, number in self.connections.numbers().items()}
         received = {number: received_bytes(descriptor) for number, descriptor in descriptors.items()}
         over, new = self._traffic.over(received, now_s)
-        for number in over:
-            shut_down(descriptors[number])
-        self.heavy += len(over)
-        return max(((size, descriptors[number]) for number, size in new.items()), default=(0, -1))
+        ended = {descriptors[number] for number in over}
+        ended |= {
+            descriptors[number]
+            for number, size in received.items()
+            if size > self._first_bytes and self.connections.is_new(descriptors[number])
+        }
+        for descriptor in ended:
+            shut_down(descriptor)
+        self.heavy += len(ended)
+        size, descriptor = max(((size, descriptors[number]) for number, size in new.items()), default=(0, -1))
+        return size, descriptor, sorted(ended)
 
     def close(self) -> None:
         """Stop watching; call before the watched socket is closed."""
@@ -113,6 +125,8 @@ class Gates:
         """Number of connections that were ended because they sent too many bytes"""
         return sum(gate.heavy for gate in self.gates)
 
-    def cut_off(self, now_s: float) -> tuple[int, int]:
-        """Do `Gate.cut_off` for all gates, after `update`; return the heaviest connection's bytes and descriptor."""
-        return max(gate.cut_off(now_s) for gate in self.gates) if self.all_seen else (0, -1)
+    def cut_off(self, now_s: float) -> tuple[int, int, list[int]]:
+        """Do `Gate.cut_off` for all gates, after `update`."""
+        found = [gate.cut_off(now_s) for gate in self.gates] if self.all_seen else []
+        size, descriptor = max(((size, descriptor) for size, descriptor, _ in found), default=(0, -1))
+        return size, descriptor, [each for _, _, ended in found for each in ended]

@@ -194,7 +194,7 @@ class KeyFolder:
                         f"allowed: {path}: its key is {roles[key]}'s by another name; valid: one role for each key"
                     )
             except ConfigurationError as error:
-                faults.append(str(error))
+                faults.append(str(error).encode("utf-8", "backslashreplace").decode())  # a name may be no text
             else:
                 names[key], roles[key] = f"{names[key]}, {path.stem}" if key in names else path.stem, role
         return Peers(names, roles, tuple(faults))
@@ -228,6 +228,7 @@ class KeyFolder:
                 f"{self.allowed_path}: cannot be read: {error.strerror}; valid: a folder that belongs to this user,"
                 " with mode 0700"
             ) from error
+        refuse_others(self.path)
         refuse_others(self.allowed_path)
         files = [path for path in paths if path.suffix == ".public" and not path.name.startswith(".")]
         if len(files) > PEER_LIMIT:

@@ -64,10 +64,10 @@ class Peers:
 
         If the routing id belonged to another key, that key's connection is forgotten: no two keys share a routing id.
         """
-        known = self.connections.get(name)
-        if known is not None and known.peer.key == key:
+        known, whose = self.connections.get(name), peer_name(key, group_of(name), observes=self._observes(key))
+        if known is not None and known.peer.name == whose:
             return known
-        connection = Connection(name, self._peer(peer_name(key, group_of(name), observes=self._observes(key)), key))
+        connection = Connection(name, self._peer(whose, key))
         if known is not None:
             connection.stands_for(known.descriptor, known.number)
             self._forget(known)
@@ -81,6 +81,15 @@ class Peers:
     def key_at(self, descriptor: int) -> str:
         """Return the key of the peer whose messages come by the TCP connection `descriptor`; empty if unknown."""
         return next((each.peer.key for each in self.connections.values() if each.descriptor == descriptor), "")
+
+    def of_key(self, key: str) -> int:
+        """Return the number of connections of a key."""
+        return sum(each.peer.key == key for each in self.connections.values())
+
+    def forget(self, connection: Connection) -> None:
+        """Forget a connection that was ended."""
+        if self.connections.get(connection.name) is connection:
+            self._forget(connection)
 
     def count(self, peer: Peer) -> int:
         """Count a message of `peer`; return how many its key has sent this second, or without keys the peer."""

@@ -7,8 +7,7 @@ class PortConnections:
     """Connections of one port, keyed by descriptor; does no I/O."""
 
     def __init__(self, limit: int, introduced_s: float) -> None:
-        """Allow `limit` connections at once. One older than `introduced_s` counts as introduced, as its handshake
-        succeeded: otherwise ZeroMQ would have ended it."""
+        """Allow `limit` connections at once. One that has said nothing for `introduced_s` is ended."""
         self.hung_up = 0
         """Number of connections that were ended because of the limit."""
         self.limit = limit
@@ -31,6 +30,10 @@ class PortConnections:
         if self._newcomers.pop(descriptor, None) is not None:
             self._known.add(descriptor)
 
+    def is_new(self, descriptor: int) -> bool:
+        """Return whether the connection has not been introduced."""
+        return descriptor in self._newcomers
+
     def number(self, descriptor: int) -> int:
         """Return the number of the descriptor's connection, counted from 1 in order of arrival; 0 for none."""
         return self._numbers.get(descriptor, 0)
@@ -46,15 +49,13 @@ class PortConnections:
         self._numbers.pop(descriptor, None)
 
     def surplus(self, now_s: float) -> Iterator[int]:
-        """Yield the connections beyond the limit, which the caller ends: the oldest newcomers.
+        """Yield the connections that the caller ends: newcomers that say nothing, and the oldest ones beyond the limit.
 
         So a quick handshake succeeds however many others connect.
         """
         while self._newcomers:
             descriptor, came_s = next(iter(self._newcomers.items()))
-            if now_s - came_s >= self._introduced_s:
-                self.introduced(descriptor)
-            elif len(self._newcomers) + len(self._known) > self.limit:
+            if now_s - came_s >= self._introduced_s or len(self._newcomers) + len(self._known) > self.limit:
                 self.ended(descriptor)
                 self.hung_up += 1
                 yield descriptor

@@ -1,19 +1,19 @@
 """Sockets of the robot side, which distinguish peers and cut off those that flood or whose key was revoked."""
 
 import contextlib
+from collections.abc import Collection
 from typing import Final
 
 import zmq
 
-from common.errors import ConfigurationError
 from common.sockets.authentication import Authenticator, RobotKeys
 from common.sockets.descriptors import shut_down
-from common.sockets.endpoints import Endpoint, parse_bind, parse_operators
+from common.sockets.endpoints import parse_operators
 from common.sockets.gate import Gate, Gates
 from common.sockets.inbox import Inbox
 from common.sockets.key_files import KeyRole
 from common.sockets.peers import Connection, Peers
-from common.sockets.readable import descriptor_of, user_of
+from common.sockets.readable import descriptor_of, readable, user_of
 from common.sockets.round_robin import Offered
 from common.sockets.shell import (
     CONTROL_LIMIT_BYTES,
@@ -33,6 +33,12 @@ off. It is 20 times an operator's rate, and twice what arrives at once after ten
 _ROLES: Final[tuple[KeyRole, ...]] = ("operator", "observer")
 HANDSHAKE_LIMIT_S = 5.0
 """Time limit of a handshake, in seconds: CURVE takes the server two round trips, of at most 2 s each in a session."""
+KEY_CONNECTIONS = 64
+"""Maximum number of connections of one key to each port: eight operator sides of eight connections"""
+SILENT_LIMIT_S = 10.0
+"""Time after which a connection that has said nothing is ended, in seconds"""
+_LONGEST_TOPIC = 64
+_SUBSCRIPTIONS_PER_CALL = 256
 MOST_CONNECTIONS = 1024
 """Maximum number of connections to each port, unless a quarter of the descriptors that this process may open is
 less."""
@@ -68,11 +74,13 @@ class RobotSockets(SocketShell):
         self._reported: list[str] = []
         self._peers = Peers(self._offer, self._observes)
         self._second = 0
-        self._view_endpoint: Endpoint | None = None
-        self._view_outdated = False
+        self._viewers: dict[int, tuple[int, str]] = {}
+        """Number and key of each view connection that has subscribed, keyed by descriptor"""
         super().__init__(heartbeat_timeout_s, HANDSHAKE_LIMIT_S)
         try:
-            self._control, self._view = self._open_control(zmq.ROUTER), self._open_view(zmq.PUB)
+            self._control, self._view = self._open_control(zmq.ROUTER), self._open_view(zmq.XPUB)
+            # So that only topics that there are take memory, and each viewer's key is known.
+            self._view.setsockopt(zmq.XPUB_MANUAL, 1)
             self._inbox = Inbox(self._control, frames=2)
             control_gate = self._watch(self._control, CONTROL_UNSENT_BYTES, CONTROL_BYTES_PER_S)
             view_gate = self._watch(self._view, VIEW_UNSENT_BYTES, VIEW_BYTES_PER_S)
@@ -114,19 +122,20 @@ class RobotSockets(SocketShell):
 
     def refresh_keys(self) -> None:
         """Read the allow-list again if it has changed, and cut off revoked peers; call a few times a second."""
-        if self._keys is None:
+        if self._keys is not None:
+            self.cut_off_keys(self._keys.allowed.refresh())
+
+    def cut_off_keys(self, keys: Collection[str]) -> None:
+        """End all connections of these keys, and forget what they were."""
+        if not keys:
             return
-        revoked = self._keys.allowed.refresh()
-        if revoked:
-            self._watch_connections()
-            for connection in self._peers.connections.values():
-                if connection.peer.key in revoked:
-                    self._hang_up(connection)
-            self._view_outdated = True
-        if self._view_outdated:
-            with contextlib.suppress(zmq.ZMQError):  # no descriptor left: the next call tries again
-                self._replace_view(self._keys)
-        self._bind_view_again()
+        self._watch_connections()
+        for connection in [one for one in self._peers.connections.values() if one.peer.key in keys]:
+            self._hang_up(connection)
+            self._peers.forget(connection)
+        for descriptor, (number, key) in [*self._viewers.items()]:
+            if key in keys:
+                self._hang_up_viewer(descriptor, number)
 
     def receive(self) -> list[tuple[bytes, bytes]]:
         """Return (peer, payload) of the control messages that have arrived, oldest first."""
@@ -137,6 +146,7 @@ class RobotSockets(SocketShell):
             self._second = second
             self._peers.begin_second()
         self._watch_connections()
+        self._read_subscriptions()
         received: list[tuple[bytes, bytes]] = []
         for name, *frames in self._inbox.read():
             connection = self._admitted(name.bytes, frames[-1] if frames else name)
@@ -178,8 +188,33 @@ class RobotSockets(SocketShell):
         Raises ValueError for more than VIEW_LIMIT_BYTES.
         """
         check_size(payload, VIEW_LIMIT_BYTES)
-        self._bind_view_again()
+        self._read_subscriptions()
         self.dropped += self.offer(self._view, topic, payload) is not Offered.TAKEN
+
+    def _read_subscriptions(self) -> None:
+        """Take viewers' subscriptions; end a viewer whose key may not watch, or who asks for what there is not."""
+        crowd = self._ports.gates[1].connections
+        for _ in range(_SUBSCRIPTIONS_PER_CALL):
+            if not readable(self._view):
+                return
+            with contextlib.suppress(zmq.ZMQError):  # its sender has left
+                frame = self._view.recv(zmq.NOBLOCK, copy=False)
+                asked, descriptor = frame.bytes, descriptor_of(frame)
+                number, key = crowd.number(descriptor), "" if self._keys is None else user_of(frame)
+                self._viewers = {each: who for each, who in self._viewers.items() if crowd.number(each) == who[0]}
+                alike = sum(other == key for _, other in self._viewers.values()) if key else 0
+                wrong = len(asked) > _LONGEST_TOPIC or asked[:1] not in (b"\x00", b"\x01")
+                if not self._allows(key) or wrong or alike > KEY_CONNECTIONS:
+                    self._hang_up_viewer(descriptor, number)
+                    continue
+                crowd.introduced(descriptor)
+                if number:
+                    self._viewers[descriptor] = number, key
+                self._view.setsockopt(zmq.SUBSCRIBE if asked[0] else zmq.UNSUBSCRIBE, asked[1:])
+
+    def _hang_up_viewer(self, descriptor: int, number: int) -> None:
+        if self._ports.all_seen and number and self._ports.gates[1].connections.number(descriptor) == number:
+            shut_down(descriptor)
 
     def wait(self, timeout_s: float | None) -> bool:
         """Wait for a control message, at most `timeout_s` (None: no limit); return whether there is one."""
@@ -188,10 +223,14 @@ class RobotSockets(SocketShell):
     def cut_off(self, now_s: float) -> tuple[int, str]:
         """End connections beyond their budget; return the heaviest one's bytes since the last call, and whose."""
         self._watch_connections()
-        size, descriptor = self._ports.cut_off(now_s)
+        size, descriptor, ended = self._ports.cut_off(now_s)
+        self._flooding |= {key for each in ended if (key := self._key_at(each))}
         names = {} if self._keys is None else self._keys.allowed.names
-        name = names.get(self._peers.key_at(descriptor))
+        name = names.get(self._key_at(descriptor))
         return size, f"{'' if name is None else f'{name} at '}{peer_address(descriptor)}"
+
+    def _key_at(self, descriptor: int) -> str:
+        return self._viewers.get(descriptor, (0, ""))[1] or self._peers.key_at(descriptor)
 
     def present(self) -> dict[bytes, tuple[str, str]]:
         """Return key and address of the peers that have been heard, keyed by their names."""
@@ -205,33 +244,10 @@ class RobotSockets(SocketShell):
         return flooding
 
     def _watch(self, part: "zmq.Socket[bytes]", unsent_bytes: int, bytes_per_s: float) -> Gate:
-        return Gate(self._context, part, MOST_CONNECTIONS, HANDSHAKE_LIMIT_S, unsent_bytes, bytes_per_s)
+        return Gate(self._context, part, MOST_CONNECTIONS, SILENT_LIMIT_S, unsent_bytes, bytes_per_s)
 
     def _watch_connections(self) -> None:
         self.crowded += self._ports.update(self._clock.now())
-
-    def _replace_view(self, keys: RobotKeys) -> None:
-        """Make a new view socket, so that all viewers must authenticate again: PUB cannot cut off a single viewer."""
-        view = self._open_view(zmq.PUB)
-        try:
-            keys.secure(view)
-            gate = self._watch(view, VIEW_UNSENT_BYTES, VIEW_BYTES_PER_S)
-        except zmq.ZMQError:
-            view.close(linger=0)
-            raise
-        control_gate, view_gate = self._ports.gates
-        view_gate.close()
-        self._view.close(linger=0)
-        self._view, self._view_outdated = view, False
-        self._ports = Gates([control_gate, gate], [view])
-        self._view_endpoint = parse_bind(self.view_endpoint, "--view-bind")
-
-    def _bind_view_again(self) -> None:
-        """Try to bind the new view socket: the port is free only after ZeroMQ's thread has closed the old socket."""
-        if self._view_endpoint is not None:
-            with contextlib.suppress(ConfigurationError):
-                bind_socket(self._view, self._view_endpoint, "--view-bind")
-                self._view_endpoint = None
 
     def _allows(self, key: str) -> bool:
         return self._keys is None or self._keys.allowed.admits(key, _ROLES)
@@ -261,6 +277,7 @@ class RobotSockets(SocketShell):
         if is_allowed:
             crowd.introduced(descriptor)
         is_surplus = self._peers.count(peer) > PEER_LIMIT_PER_S
+        is_surplus |= bool(key) and self._peers.of_key(key) > KEY_CONNECTIONS
         if is_allowed and not is_surplus:
             return connection
         self.flooding += is_allowed

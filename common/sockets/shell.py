@@ -79,7 +79,7 @@ class SocketShell:
 
     def _open_view(self, view_type: int) -> "zmq.Socket[bytes]":
         part = self._context.socket(view_type)
-        publishes = view_type == zmq.PUB
+        publishes = view_type == zmq.XPUB
         for option, value in (
             (zmq.AFFINITY, _VIEW_THREAD),
             (zmq.SNDHWM, VIEW_HIGH_WATER_MARK),

@@ -7,10 +7,13 @@ shows it in time.
 from collections.abc import Mapping
 from typing import Final
 
-CONTROL_BYTES_PER_S: Final = 2e6
+CONTROL_BYTES_PER_S: Final = 2e5
 VIEW_BYTES_PER_S: Final = 64e3
-"""Budgets of a connection to the control port and to the view port, in bytes a second: a key's most messages, twice as
-long as an operator's; a viewer's subscriptions are some bytes."""
+"""Budgets of a connection to the control port and to the view port, in bytes a second: an operator sends 45 kB/s over
+all its connections, a viewer's subscriptions are some bytes."""
+TOGETHER: Final = 4
+"""Budget of all connections of a port together, as a multiple of one's: parts of a message cost ZeroMQ 25 times their
+bytes"""
 BURST_S: Final = 4.0
 """Time whose budget may come at once, in seconds: a link that was blocked delivers what has waited"""
 
@@ -26,7 +29,7 @@ class Traffic:
         self._now_s: float | None = None
 
     def over(self, received: Mapping[int, int], now_s: float) -> tuple[list[int], dict[int, int]]:
-        """Return the connections beyond their budget, and the bytes of each since the last call.
+        """Return the connections beyond their budget, the heaviest first, and the bytes of each since the last call.
 
         received: bytes that each connection has received since it began, keyed by a number that no other ever has.
         """
@@ -37,4 +40,10 @@ class Traffic:
         self._levels = {
             number: max(self._levels.get(number, 0.0) - leaked, 0.0) + count for number, count in new.items()
         }
-        return [number for number, level in self._levels.items() if level > BURST_S * self.bytes_per_s], new
+        most, together, over = BURST_S * self.bytes_per_s, sum(self._levels.values()), []
+        for number, level in sorted(self._levels.items(), key=lambda item: -item[1]):
+            if level <= most and together <= TOGETHER * most:
+                break
+            over.append(number)
+            together -= level
+        return over, new

@@ -16,6 +16,10 @@ class Log(Protocol):
         """Add an event with the present time; never waits."""
         ...
 
+    def take_failure(self) -> bool:
+        """Return whether an event was lost for the first time since the last call."""
+        ...
+
 
 class Audit:
     """Watches the session, and passes on what the door tells."""
@@ -34,8 +38,11 @@ class Audit:
             self._names.pop(event.peer, None)
         self._log.note(event.kind, who=event.who, where=event.where)
 
-    def look(self, session: OperatorSession, events: Sequence[Event]) -> None:
-        """Log `events` at the ports, and what changed in the session: the lease's owner, whether the arm is armed."""
+    def look(self, session: OperatorSession, events: Sequence[Event]) -> str | None:
+        """Log `events` at the ports, and what changed in the session: the lease's owner, whether the arm is armed.
+
+        Return a line once events are lost.
+        """
         for event in events:
             self._at_the_door(event)
         owner, state = session.owner_peer, session.safety.state
@@ -52,6 +59,7 @@ class Audit:
             elif armed_before:
                 stops = session.safety.stops
                 self._log.note("disarmed", why=str(stops[-1][1]) if stops else "")
+        return "--audit: events are lost, as the disk refuses them" if self._log.take_failure() else None
 
     def _note(self, event: str, peer: bytes) -> None:
         who, where = self._names.get(peer, ("", ""))

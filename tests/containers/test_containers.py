@@ -103,7 +103,19 @@ def test_sigterm_ends_both_sides_well(running: Engine) -> None:
 
 def test_a_trial_of_the_latency_experiment(compose: Compose, tmp_path: Path) -> None:
     """A trial touches the object both in virtual time and in containers, and leaves no container behind."""
-    words = ["--links", "lan", "--haptics", "off", "--seeds", "1", "--duration", "20", "--media", "virtual", "--compose"]
+    words = [
+        "--links",
+        "lan",
+        "--haptics",
+        "off",
+        "--seeds",
+        "1",
+        "--duration",
+        "20",
+        "--media",
+        "virtual",
+        "--compose",
+    ]
     # Trials of others, and remains of older ones, are not judged here.
     before = compose.existing(f"name={TRIALS}")
     summary = tmp_path / "latency.json"

@@ -43,6 +43,8 @@ _LIVED_S: Final = 5.0
 """Time until the next start, in seconds, after a door that ended within `_LIVED_S`; others are replaced at once."""
 SILENT_S: Final = 3.0
 """Time without a word, in seconds, after which a door is taken to hang: it says something ten times a second"""
+_STARTS_S: Final = 60.0
+"""Time, in seconds, after which one that starts is taken to hang: slow machines start slowly"""
 _OURS_S: Final = 0.5
 """Time between two of our own calls from which on the silence may be ours"""
 _LAST_WORDS_S: Final = 0.5
@@ -204,7 +206,7 @@ class Door:
         if self._next_start_s is not None:
             if now_s >= self._next_start_s:
                 self._begin(now_s)
-        elif channel.ended or (self._ready and now_s - self._heard_s > SILENT_S):
+        elif channel.ended or now_s - self._heard_s > (SILENT_S if self._ready else _STARTS_S):
             self._end(self._companion, now_s)
 
     def ask(self, message: Asked) -> bool:
@@ -281,7 +283,7 @@ class Door:
         """Note why the door ended, and who had sent most; start another one soon."""
         ended = companion.channel.ended
         companion.close(0.0)
-        if not (self._ready or self.restarts):
+        if self._listening is None and not self._ready:
             self._failure = "the process that owns the ports ended while it started"
             return
         self._next_start_s = now_s + (RETRY_S if now_s - self._began_s < _LIVED_S else 0.0)

@@ -54,7 +54,7 @@ KEYS_S: Final = 0.2
 _BARRED_S: Final = 10.0
 """Time for which a key that flooded is not let in, in seconds"""
 _WAIT_S: Final = 0.05
-_MOST_EVENTS: Final = 20
+_MOST_EVENTS: Final = 3
 """Largest number of events of a kind, each tenth of a second: strangers without keys make as many names as they like"""
 
 
@@ -126,12 +126,14 @@ class Keeper:
     def _wait(self) -> None:
         ports = [*self._drivers.values()] if self._sockets is None else [self._sockets, *self._drivers.values()]
         waits_s = _WAIT_S
-        descriptors = [self._channel.fileno()]
+        polled = select.poll()
+        polled.register(self._channel.fileno(), select.POLLIN | (select.POLLOUT if self._channel.waiting else 0))
         for port in ports:
             if port.pending():
                 waits_s = 0.0
-            descriptors += port.descriptors
-        select.select(descriptors, [self._channel] if self._channel.waiting else [], [], waits_s)
+            for descriptor in port.descriptors:
+                polled.register(descriptor, select.POLLIN)
+        polled.poll(1e3 * waits_s)
 
     def _do(self, asked: Asked) -> None:
         match asked:
@@ -164,10 +166,12 @@ class Keeper:
             flooding |= sockets.take_flooding()
         if now_s >= self._keys_s:
             self._keys_s = now_s + KEYS_S
+            # Once for all ports: it tells of each revocation once.
+            revoked = set() if self._keys is None else self._keys.allowed.refresh()
             for port in self._drivers.values():
-                notes += port.refresh_keys()
+                notes += port.news()
             if sockets is not None:
-                sockets.refresh_keys()
+                sockets.cut_off_keys(revoked)
                 notes += sockets.news()
         before = self._barred.keys()
         notes += self._bar(flooding, now_s)

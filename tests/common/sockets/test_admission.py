@@ -246,15 +246,14 @@ def test_a_crowd_loses_its_oldest_newcomer_and_keeps_introduced_peers() -> None:
     crowd.accepted(10, 1.9)
     assert (list(crowd.surplus(1.9)), crowd.hung_up) == ([0], 1)
     crowd.accepted(11, 2.1)
-    # 2 has been introduced by now, or it would have ended.
-    assert list(crowd.surplus(2.1)) == [10]
+    assert list(crowd.surplus(2.1)) == [2], "it has said nothing for too long"
     crowd.introduced(11)
     crowd.accepted(12, 2.2)
-    assert list(crowd.surplus(2.2)) == [12], "all the others are in"
+    assert list(crowd.surplus(2.2)) == [10], "the oldest newcomer, as all the others are in"
     crowd.ended(1)
     crowd.accepted(1, 2.3)
     crowd.accepted(13, 2.4)
-    assert list(crowd.surplus(2.4)) == [1], "its number stands for another one"
+    assert list(crowd.surplus(2.4)) == [12]
     crowd.ended(99)
     crowd.introduced(99)
     assert list(crowd.surplus(2.4)) == []

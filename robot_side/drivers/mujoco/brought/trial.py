@@ -4,6 +4,7 @@ import contextlib
 import ctypes
 import os
 import resource
+import select
 import signal
 import sys
 import threading
@@ -23,6 +24,8 @@ _MOST_BYTES: Final = 2 << 30
 """Memory that MuJoCo may take for a model"""
 _MOST_CPU_S: Final = 20
 """Processor time, in seconds, that it may take"""
+_LONGEST_S: Final = 120.0
+"""Time, in seconds, that it may wait for the files that a model names"""
 _PR_SET_PDEATHSIG: Final = 1
 _ENDING: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 _LONGEST: Final = 4096
@@ -51,6 +54,8 @@ def try_model(path: Path) -> None:
     os.close(writing)
     try:
         with os.fdopen(reading, "rb") as said:
+            if not select.select([said], [], [], _LONGEST_S)[0]:
+                os.kill(child, signal.SIGKILL)  # it may wait for a pipe that the model names
             why = said.read(_LONGEST).decode("utf-8", "replace")  # to the child's end
     except BaseException:
         os.kill(child, signal.SIGKILL)

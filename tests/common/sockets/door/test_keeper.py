@@ -9,10 +9,12 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+import zmq
 
+from common.peer_name import may_drive
 from common.sockets.authentication import OperatorKeys, make_key_pair
 from common.sockets.door.client import Door
-from common.sockets.door.messages import DoorSettings, Listening
+from common.sockets.door.messages import DoorSettings, DriverSettings, Listening
 from common.sockets.keys import KeyFolder
 from common.sockets.operator import OperatorSockets
 from common.sockets.tcp_figures import TcpFigures
@@ -143,6 +145,44 @@ def test_a_key_that_floods_is_not_let_in_for_a_while_and_others_are(tmp_path: Pa
         wait_until("mallory is barred", barred)
         door.hears(honest, b"still here")
     assert door.door.counts()["flooding"] > 0
+
+
+def test_a_changed_role_and_a_revocation_reach_peers_that_are_connected(tmp_path: Path) -> None:
+    """A driver's port has the same list of keys: it must not take the news of a revocation from the others."""
+    folder, (robot, secret), (anna, annas) = KeyFolder(tmp_path), make_key_pair(), make_key_pair()
+    folder.write_pair("robot", robot, secret)
+    folder.allow("anna", anna)
+    arm = {"--arm": DriverSettings(EPHEMERAL, "driver", 4096, 1e6)}
+    with (
+        opened(DoorSettings(EPHEMERAL, EPHEMERAL, arm, keys=str(tmp_path))) as door,
+        connected(door.at, OperatorKeys(annas, robot)) as operator,
+    ):
+        assert may_drive(door.hears(operator, b"drive"))
+        folder.allow("anna", anna, "observer")
+        wait_until("she only observes", lambda: not may_drive(door.hears(operator, b"watch")))
+
+        def views() -> int:
+            for _ in range(20):
+                door.door.publish(b"telemetry", b"seen")
+                door.door.wait(0.01)
+                operator.send(b"watch")
+                operator.wait(0.0)
+            return len(operator.receive_view())
+
+        wait_until("views arrive", lambda: views() > 0)
+        folder.revoke("anna")
+        wait_until("no view arrives any more", lambda: views() == 0 and views() == 0)
+
+
+def test_a_subscription_to_what_there_is_not_takes_no_memory_and_ends_the_viewer(door: Opened) -> None:
+    with zmq.Context() as context, context.socket(zmq.SUB) as viewer, connected(door.at) as operator:
+        viewer.setsockopt(zmq.LINGER, 0)
+        with viewer.get_monitor_socket(zmq.EVENT_DISCONNECTED) as monitor:
+            viewer.connect(door.at.view)
+            viewer.setsockopt(zmq.SUBSCRIBE, b"t" * 2000)
+            wait_until("it is ended", lambda: monitor.poll(10))
+            viewer.disable_monitor()
+        door.hears(operator, b"forth")
 
 
 def test_the_process_that_ticks_has_no_zeromq() -> None:
