@@ -4,6 +4,7 @@ ZeroMQ asks over a separate socket whether a key is allowed (ZAP, rfc.zeromq.org
 messages answers, so that there is no other thread that could die unnoticed. Without answers no peer is admitted.
 """
 
+from collections import Counter
 from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
@@ -25,6 +26,8 @@ _ANSWERS_PER_CALL = 4
 """Maximum number of handshakes answered per call, so that a storm of handshakes does not block the caller."""
 _EVENTS_PER_CALL = 16
 _REMEMBERED_REFUSALS = 64
+MOST_HANDSHAKES = 50
+"""Maximum number of handshakes of a key in a window of the caller's: an operator side that connects again has nine"""
 
 
 def make_key_pair() -> tuple[str, str]:
@@ -109,6 +112,7 @@ class Authenticator:
         self.refused = 0
         """Number of handshakes with a key that is not allowed."""
         self._allowed, self._roles = allowed, roles
+        self._handshakes: Counter[str] = Counter()
         self.refusals: list[tuple[str, str]] = []
         """Keys that were refused for the first time, and their addresses; the caller empties it"""
         self._refused_keys: dict[str, bool] = {}
@@ -119,6 +123,12 @@ class Authenticator:
     def fileno(self) -> int:
         """Return a descriptor that becomes readable when a handshake waits for an answer."""
         return self._questions.fileno()
+
+    def begin_window(self) -> set[str]:
+        """Count the handshakes of each key anew; return the keys that had more than MOST_HANDSHAKES."""
+        rushing = {key for key, count in self._handshakes.items() if count > MOST_HANDSHAKES}
+        self._handshakes.clear()
+        return rushing
 
     def serve(self) -> bool:
         """Answer a few waiting handshakes; return whether more may wait. Never blocks."""
@@ -148,10 +158,12 @@ class Authenticator:
         request = question[1] if len(question) > 1 else b""
         is_curve = len(question) == 7 and question[5] == b"CURVE" and question[2] == _ZAP_DOMAIN
         key = question[6].hex() if is_curve else ""
-        if self._allowed.admits(key, self._roles):
+        admitted = self._allowed.admits(key, self._roles)
+        self._handshakes[key] += admitted
+        if admitted and self._handshakes[key] <= MOST_HANDSHAKES:
             return [b"1.0", request, b"200", b"", key.encode(), b""]
         self.refused += 1
-        is_new = key not in self._refused_keys and key not in self._allowed.barred
+        is_new = not admitted and key not in self._refused_keys and key not in self._allowed.barred
         room = len(self._refused_keys) < _REMEMBERED_REFUSALS or key in self._allowed.names
         if is_curve and is_new and room:
             self._refused_keys[key] = True

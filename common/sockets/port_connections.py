@@ -1,6 +1,12 @@
 """Bound on the connections of one port. Introduced connections stay; of the others (newcomers) the oldest are ended."""
 
 from collections.abc import Iterator
+from typing import Final
+
+KEY_CONNECTIONS: Final = 64
+"""Maximum number of connections of one key to a port: eight operator sides of eight connections"""
+SILENT_LIMIT_S: Final = 10.0
+"""Time after which a connection that has said nothing is ended, in seconds"""
 
 
 class PortConnections:

@@ -1,6 +1,7 @@
 """Sockets of the robot side, which distinguish peers and cut off those that flood or whose key was revoked."""
 
 import contextlib
+from collections import Counter
 from collections.abc import Collection
 from typing import Final
 
@@ -13,6 +14,7 @@ from common.sockets.gate import Gate, Gates
 from common.sockets.inbox import Inbox
 from common.sockets.key_files import KeyRole
 from common.sockets.peers import Connection, Peers
+from common.sockets.port_connections import KEY_CONNECTIONS, SILENT_LIMIT_S
 from common.sockets.readable import descriptor_of, readable, user_of
 from common.sockets.round_robin import Offered
 from common.sockets.shell import (
@@ -33,15 +35,11 @@ off. It is 20 times an operator's rate, and twice what arrives at once after ten
 _ROLES: Final[tuple[KeyRole, ...]] = ("operator", "observer")
 HANDSHAKE_LIMIT_S = 5.0
 """Time limit of a handshake, in seconds: CURVE takes the server two round trips, of at most 2 s each in a session."""
-KEY_CONNECTIONS = 64
-"""Maximum number of connections of one key to each port: eight operator sides of eight connections"""
-SILENT_LIMIT_S = 10.0
-"""Time after which a connection that has said nothing is ended, in seconds"""
-_LONGEST_TOPIC = 64
+_LONGEST_TOPIC = _MOST_SUBSCRIPTIONS = 64
+"""Maximum length of a topic, and number of subscriptions over the life of a connection: each takes memory"""
 _SUBSCRIPTIONS_PER_CALL = 256
 MOST_CONNECTIONS = 1024
-"""Maximum number of connections to each port, unless a quarter of the descriptors that this process may open is
-less."""
+"""Maximum number of connections to each port, or a quarter of the descriptors that this process may open."""
 
 
 class RobotSockets(SocketShell):
@@ -74,6 +72,8 @@ class RobotSockets(SocketShell):
         self._reported: list[str] = []
         self._peers = Peers(self._offer, self._observes)
         self._second = 0
+        self._asked: Counter[tuple[int, int]] = Counter()
+        """Subscriptions of each view connection, keyed by descriptor and number"""
         self._viewers: dict[int, tuple[int, str]] = {}
         """Number and key of each view connection that has subscribed, keyed by descriptor"""
         super().__init__(heartbeat_timeout_s, HANDSHAKE_LIMIT_S)
@@ -127,8 +127,6 @@ class RobotSockets(SocketShell):
 
     def cut_off_keys(self, keys: Collection[str]) -> None:
         """End all connections of these keys, and forget what they were."""
-        if not keys:
-            return
         self._watch_connections()
         for connection in [one for one in self._peers.connections.values() if one.peer.key in keys]:
             self._hang_up(connection)
@@ -144,6 +142,8 @@ class RobotSockets(SocketShell):
         now_s = self._clock.now()
         if (second := int(now_s)) != self._second:
             self._second = second
+            crowd = self._ports.gates[1].connections
+            self._asked = Counter({each: n for each, n in self._asked.items() if crowd.number(each[0]) == each[1]})
             self._peers.begin_second()
         self._watch_connections()
         self._read_subscriptions()
@@ -204,7 +204,10 @@ class RobotSockets(SocketShell):
                 self._viewers = {each: who for each, who in self._viewers.items() if crowd.number(each) == who[0]}
                 alike = sum(other == key for _, other in self._viewers.values()) if key else 0
                 wrong = len(asked) > _LONGEST_TOPIC or asked[:1] not in (b"\x00", b"\x01")
-                if not self._allows(key) or wrong or alike > KEY_CONNECTIONS:
+                self._asked[descriptor, number] += 1
+                greedy = self._asked[descriptor, number] > _MOST_SUBSCRIPTIONS or alike > KEY_CONNECTIONS
+                if wrong or greedy or not self._allows(key):
+                    self._flooding |= {key} if key and greedy else set()
                     self._hang_up_viewer(descriptor, number)
                     continue
                 crowd.introduced(descriptor)
@@ -234,9 +237,8 @@ class RobotSockets(SocketShell):
 
     def present(self) -> dict[bytes, tuple[str, str]]:
         """Return key and address of the peers that have been heard, keyed by their names."""
-        return {
-            each.peer.name: (each.peer.key, peer_address(each.descriptor)) for each in self._peers.connections.values()
-        }
+        connections = self._peers.connections.values()
+        return {each.peer.name: (each.peer.key, peer_address(each.descriptor)) for each in connections}
 
     def take_flooding(self) -> set[str]:
         """Return the keys that were cut off because of PEER_LIMIT_PER_S since the last call."""

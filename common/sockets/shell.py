@@ -117,6 +117,10 @@ class SocketShell:
         """Number of handshakes with a key that is not allowed."""
         return 0 if self._authenticator is None else self._authenticator.refused
 
+    def begin_window(self) -> set[str]:
+        """Count the handshakes of each key at a bound socket anew; return the keys that had too many."""
+        return set() if self._authenticator is None else self._authenticator.begin_window()
+
     def take_refusals(self) -> list[tuple[str, str]]:
         """Return the keys that a bound socket has refused for the first time since the last call, with addresses."""
         if self._authenticator is None:

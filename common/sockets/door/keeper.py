@@ -51,6 +51,8 @@ MEMORY_BYTES: Final = 512 << 20
 _WATCH_S: Final = 0.1
 KEYS_S: Final = 0.2
 """Periods of the figures and budgets, and of reading the list of allowed keys: a revoked operator is cut off in 1 s"""
+_WINDOW_S: Final = 2.0
+"""Period in which a key may make so many handshakes (MOST_HANDSHAKES), in seconds"""
 _BARRED_S: Final = 10.0
 """Time for which a key that flooded is not let in, in seconds"""
 _WAIT_S: Final = 0.05
@@ -73,7 +75,7 @@ class Keeper:
         self._busiest = ""
         self._present: dict[tuple[str, bytes], tuple[str, str]] = {}
         self._heavy = 0
-        self._watch_s = self._keys_s = self._clock.now()
+        self._watch_s = self._keys_s = self._window_s = self._clock.now()
         self._ends = False
         # Fail at once for an occupied port; open meanwhile, so that a program's flag with the same port is named.
         with nullcontext() if settings.listens else closing(self._bound()):
@@ -164,6 +166,10 @@ class Keeper:
         if sockets is not None:
             heaviest = max(heaviest, sockets.cut_off(now_s))
             flooding |= sockets.take_flooding()
+        if now_s >= self._window_s:
+            self._window_s = now_s + _WINDOW_S
+            for each in (*self._drivers.values(), *([] if sockets is None else [sockets])):
+                flooding |= each.begin_window()
         if now_s >= self._keys_s:
             self._keys_s = now_s + KEYS_S
             # Once for all ports: it tells of each revocation once.

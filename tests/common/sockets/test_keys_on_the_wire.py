@@ -9,7 +9,14 @@ import zmq
 
 from common.clock import MonotonicClock
 from common.sockets.allow_list import AllowList
-from common.sockets.authentication import Authenticator, OperatorKeys, RobotKeys, make_key_pair, public_part
+from common.sockets.authentication import (
+    MOST_HANDSHAKES,
+    Authenticator,
+    OperatorKeys,
+    RobotKeys,
+    make_key_pair,
+    public_part,
+)
 from common.sockets.keys import KeyFolder
 from common.sockets.operator import OperatorSockets
 from common.sockets.robot import RobotSockets
@@ -115,6 +122,28 @@ def test_each_refused_key_is_told_once_and_of_a_flood_only_the_first(tmp_path: P
         asked = [ask(1, mechanism=b"PLAIN"), ask(1, domain=b"another"), ask(1), ask(1), *map(ask, range(100))]
         assert asked == [0, 0, 1, 0, 1, 0] + [1] * 62 + [0] * 36
         assert authenticator.refused == 104
+        context.destroy(linger=0)
+
+
+def test_a_key_that_shakes_hands_without_end_is_refused_until_the_next_window(tmp_path: Path) -> None:
+    folder, key = KeyFolder(tmp_path), bytes([7]) * 32
+    folder.allow("anna", key.hex())
+    allowed = AllowList(folder)
+    allowed.refresh()
+    with zmq.Context() as context, context.socket(zmq.REQ) as part:
+        authenticator = Authenticator(context, allowed)
+        part.connect("inproc://zeromq.zap.01")
+
+        def ask() -> bytes:
+            part.send_multipart([b"1.0", b"1", b"feelahead", b"", b"", b"CURVE", key])
+            authenticator.serve()
+            return part.recv_multipart()[2]
+
+        assert [ask() for _ in range(MOST_HANDSHAKES + 2)] == [b"200"] * MOST_HANDSHAKES + [b"400"] * 2
+        assert authenticator.news() == []
+        assert authenticator.begin_window() == {key.hex()}
+        assert ask() == b"200"
+        assert authenticator.begin_window() == set()
         context.destroy(linger=0)
 
 
