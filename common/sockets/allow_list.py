@@ -16,7 +16,7 @@ class AllowList:
     names: dict[str, str] = field(default_factory=dict)
     """Names of the admitted peers, keyed by their public keys."""
     roles: dict[str, KeyRole] = field(default_factory=dict)
-    """Their roles, keyed likewise"""
+    """Roles of the admitted peers, keyed by their public keys"""
     revoked: list[str] = field(default_factory=list)
     """Names that were revoked, or got another role, since the caller emptied it"""
     barred: frozenset[str] = frozenset()

@@ -116,16 +116,6 @@ class DriverPort(SocketShell):
         self.dropped += not taken
         return taken
 
-    def refresh_keys(self) -> list[str]:
-        """Read the allow-list again; return a line for each unknown key that was newly refused.
-
-        Other sockets with the same allow-list are told of revoked keys by nobody: refresh it once for all.
-        """
-        if self._keys is None:
-            return []
-        self._keys.allowed.refresh()
-        return self.news()
-
     def news(self) -> list[str]:
         """Return a line for each unknown key that was newly refused since the last call."""
         return [] if self._authenticator is None else self._authenticator.news()

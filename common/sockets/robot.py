@@ -120,13 +120,8 @@ class RobotSockets(SocketShell):
         reported, self._reported = self._reported, wrong
         return news + [text for text in wrong if text not in reported]
 
-    def refresh_keys(self) -> None:
-        """Read the allow-list again if it has changed, and cut off revoked peers; call a few times a second."""
-        if self._keys is not None:
-            self.cut_off_keys(self._keys.allowed.refresh())
-
     def cut_off_keys(self, keys: Collection[str]) -> None:
-        """End all connections of these keys, and forget what they were."""
+        """End all connections of these keys, which were revoked or have another role, and forget the peers."""
         self._watch_connections()
         for connection in [one for one in self._peers.connections.values() if one.peer.key in keys]:
             self._hang_up(connection)
@@ -241,7 +236,7 @@ class RobotSockets(SocketShell):
         return {each.peer.name: (each.peer.key, peer_address(each.descriptor)) for each in connections}
 
     def take_flooding(self) -> set[str]:
-        """Return the keys that were cut off because of PEER_LIMIT_PER_S since the last call."""
+        """Return the keys that had too many connections, messages, bytes or subscriptions since the last call."""
         flooding, self._flooding = self._flooding, set()
         return flooding
 
@@ -282,10 +277,11 @@ class RobotSockets(SocketShell):
         is_surplus |= bool(key) and self._peers.of_key(key) > KEY_CONNECTIONS
         if is_allowed and not is_surplus:
             return connection
-        self.flooding += is_allowed
+        barred = self._keys is not None and key in self._keys.allowed.barred
+        self.flooding += is_allowed or barred
+        self.revoked += not (is_allowed or barred)
         if is_allowed and key:
             self._flooding.add(key)
-        self.revoked += not is_allowed
         self._watch_connections()
         number = crowd.number(descriptor)
         if self._ports.all_seen and number != connection.number and self._is_there(connection):

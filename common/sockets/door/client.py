@@ -283,7 +283,7 @@ class Door:
         """Note why the door ended, and who had sent most; start another one soon."""
         ended = companion.channel.ended
         companion.close(0.0)
-        if self._listening is None and not self._ready:
+        if not (self._ready or self.restarts):
             self._failure = "the process that owns the ports ended while it started"
             return
         self._next_start_s = now_s + (RETRY_S if now_s - self._began_s < _LIVED_S else 0.0)

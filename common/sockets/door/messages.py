@@ -80,7 +80,7 @@ Kind = Literal["connected", "left", "refused", "revoked", "barred", "cut off"]
 
 
 class Event(Struct, frozen=True, array_like=True):
-    """What somebody did, or what was done to them, for the audit log."""
+    """Event at a port, for the audit log."""
 
     kind: Kind
     who: str
@@ -92,7 +92,7 @@ class Event(Struct, frozen=True, array_like=True):
 
 
 class Figures(Struct, frozen=True, array_like=True, tag=6):
-    """What has happened at the ports since they were opened; sent ten times a second, and before the end."""
+    """Figures of the ports since they were opened; sent ten times a second, and before the end."""
 
     counts: dict[str, int]
     tcp: TcpFigures
@@ -100,7 +100,7 @@ class Figures(Struct, frozen=True, array_like=True, tag=6):
     notes: list[str]
     events: list[Event]
     busiest: str
-    """Who sent most bytes in the last second, in words; empty if nobody sent anything"""
+    """Peer that sent most bytes at the newest look that saw any, in words; empty before"""
 
 
 class ToPeer(Struct, frozen=True, array_like=True, tag=1):

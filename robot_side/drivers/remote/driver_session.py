@@ -238,6 +238,8 @@ class DriverSession:
             # A driver that returns after a silence keeps its clock, so that its earlier messages count as old.
             if self._last_peer != peer or said.sequence <= self._sequence:
                 self._begin(said.sequence)
+                if self._last_peer == peer:
+                    self._doubt_states("the driver was started again: look where the arm is", received_s)
             if self._last_peer not in (None, peer):
                 self._doubt_states("another driver drives the arm now: look where it is", received_s)
                 self._notes.append("driver: another one has taken over")

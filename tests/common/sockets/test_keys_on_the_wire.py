@@ -24,6 +24,12 @@ from tests.helpers.machines.waiting import LIMIT_S
 from tests.helpers.socket_talk import EPHEMERAL, PATIENT_S
 
 
+def refresh(sockets: RobotSockets) -> None:
+    """Read the allow-list again and cut off revoked keys, as the door does."""
+    assert sockets._keys is not None
+    sockets.cut_off_keys(sockets._keys.allowed.refresh())
+
+
 @dataclass
 class Robot:
     folder: KeyFolder
@@ -34,7 +40,7 @@ class Robot:
         public, secret = make_key_pair()
         if allowed:
             self.folder.allow(name, public)
-            self.sockets.refresh_keys()
+            refresh(self.sockets)
         return self.connect(OperatorKeys(secret, self.public))
 
     def connect(self, keys: OperatorKeys | None) -> OperatorSockets:
@@ -152,7 +158,7 @@ def test_a_key_that_is_allowed_later_gets_in_without_a_restart(robot: Robot) -> 
     with robot.connect(OperatorKeys(secret, robot.public)) as late:
         assert stays_out(robot, late)
         robot.folder.allow("late", public)
-        robot.sockets.refresh_keys()
+        refresh(robot.sockets)
         assert gets_in(robot, late)
         clock = MonotonicClock()
         end_s = clock.now() + LIMIT_S
@@ -178,7 +184,7 @@ def test_a_port_that_hangs_up_is_not_taken_for_one_that_asks_for_keys() -> None:
 def test_without_a_key_or_with_a_wrong_robot_key_nothing_comes_and_the_flag_is_named(robot: Robot) -> None:
     public, secret = make_key_pair()
     robot.folder.allow("anna", public)
-    robot.sockets.refresh_keys()
+    refresh(robot.sockets)
     for keys, flag in ((None, "--keys"), (OperatorKeys(secret, public_part("01" * 32)), "--robot-key")):
         with robot.connect(keys) as stranger:
             assert stays_out_and_says(robot, stranger, flag)
@@ -199,7 +205,7 @@ def test_a_revoked_key_is_cut_off_from_control_and_view_and_others_see_on(robot:
         anna_peer = exchange(robot, anna, LIMIT_S, until_both=True).at_robot[0][0]
         assert gets_in(robot, ben)
         robot.folder.revoke("anna")
-        robot.sockets.refresh_keys()
+        refresh(robot.sockets)
         # Messages sent before the revocation may still be in her own buffers.
         anna.receive(), anna.receive_view()
         clock = MonotonicClock()
@@ -207,7 +213,7 @@ def test_a_revoked_key_is_cut_off_from_control_and_view_and_others_see_on(robot:
         ben_sees = False
         after = []
         while clock.now() < end_s and not (ben_sees and "feelahead keys allow" in str(anna.trouble)):
-            robot.sockets.refresh_keys()
+            refresh(robot.sockets)
             after += [peer for peer, _ in exchange(robot, anna, 0.01, until_both=False).at_robot]
             assert not robot.sockets.send(anna_peer, b"stiffness")
             ben.wait(0.0)
@@ -229,10 +235,10 @@ def test_a_view_that_cannot_be_reopened_is_tried_again(robot: Robot, monkeypatch
         robot.folder.revoke("anna")
         with monkeypatch.context() as patch:
             patch.setattr(robot.sockets, "_open_view", short)
-            robot.sockets.refresh_keys()
-            robot.sockets.refresh_keys()
+            refresh(robot.sockets)
+            refresh(robot.sockets)
             robot.sockets.publish(b"telemetry", b"state")
-        robot.sockets.refresh_keys()
+        refresh(robot.sockets)
         assert gets_in(robot, ben)
         exchange(robot, anna, 0.1, until_both=False)  # Messages under way.
         assert stays_out(robot, anna)
@@ -244,7 +250,7 @@ def test_a_broken_allow_list_lets_nobody_stay(robot: Robot) -> None:
         assert anna.send(b"motion")
         assert robot.sockets.wait(PATIENT_S)
         robot.folder.allowed_path.chmod(0o777)
-        robot.sockets.refresh_keys()
+        refresh(robot.sockets)
         assert robot.sockets.receive() == []
         assert robot.sockets.revoked > robot.sockets.flooding == 0
         exchange(robot, anna, 0.05, until_both=False)

@@ -115,6 +115,17 @@ def test_a_driver_that_restarts_begins_anew_with_another_clock(peer: bytes, sequ
     assert not desk.arm.session.rejected
 
 
+def test_a_driver_that_was_started_again_may_have_moved_the_arm_and_is_doubted_for_a_while() -> None:
+    desk = DriverDesk()
+    desk.run(1.5)
+    desk.speaks = False
+    desk.run(0.4)  # Shorter than --safety.arm-s may be.
+    desk.sequence, desk.newest = 0, None
+    desk.say(echo_s=None, held_s=0.0, joint_positions=[0.4, 0.0])
+    desk.run(0.002)
+    assert desk.arm.state(desk.now_s).doubt == "the driver was started again: look where the arm is"
+
+
 def test_a_second_driver_is_refused_and_hears_why() -> None:
     desk = DriverDesk()
     desk.run(0.5)
