@@ -9,6 +9,7 @@ import pytest
 from hypothesis import HealthCheck, settings
 
 from common.command.launch import single_threaded_algebra
+from tests.helpers.repository import ROOT
 
 # The same examples each time, however long the machine takes for one.
 settings.register_profile("here", deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
@@ -16,16 +17,22 @@ settings.load_profile("here")
 
 single_threaded_algebra()
 
-STARTS = {"subprocess.Popen", "os.posix_spawn"}
-"""Events of Python; a fork is allowed, as each model that a test brings is tried in one"""
+STARTS = {"subprocess.Popen", "os.fork", "os.posix_spawn"}
 FONTS = "fc-list"
 """Program that matplotlib runs once on each machine, before its first figure; any test may start it"""
+TRIAL = ROOT / "robot_side" / "drivers" / "mujoco" / "brought" / "trial.py"
+"""File that tries each model that is brought in a fork; any test may bring one"""
 unmarked: list[str] = []
 """Name of the running test if it has neither marker, `processes` nor `install`; otherwise empty"""
 
 
+def _is_allowed(arguments: tuple[Any, ...]) -> bool:
+    """Return whether any test may start this process: the list of fonts, or the trial of a model that it brings."""
+    return arguments[:1] == (FONTS,) or sys._getframe(2).f_code.co_filename == str(TRIAL)
+
+
 def refuse_processes(event: str, arguments: tuple[Any, ...]) -> None:
-    if unmarked and event in STARTS and arguments[0] != FONTS:
+    if unmarked and event in STARTS and not _is_allowed(arguments):
         raise AssertionError(f"{unmarked[0]} starts a process and carries neither marker, processes nor install")
 
 
