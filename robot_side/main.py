@@ -22,6 +22,7 @@ from robot_side.drivers.mujoco.viewpoints import first_person_eye, overview_eye
 from robot_side.drivers.remote.connected_drivers import ConnectedDrivers, driver_ports
 from robot_side.parts import build_parts
 from robot_side.recording.recorder import RobotEncoder, RobotRecorder
+from robot_side.reporting.audit import Audit
 from robot_side.settings import RobotSettings
 from robot_side.tick.events import Listener
 from robot_side.tick.outgoing import SENT_STREAMS
@@ -82,6 +83,12 @@ def command(arguments: Sequence[str], adapt: Callable[[RobotParts], Adapted] = a
         core_parts, others = adapt(parts)
         physics = PhysicsTime(loop.clock, settings.seed)
         core = RobotSide(core_parts, [physics, *recorder, *others])
+        audit = None if log is None else Audit(log)
+
+        def write_audit() -> None:
+            for text in [] if audit is None else audit.look(core.session, door.take_events()):
+                process.note(text)
+
         sent = [stream for stream in SENT_STREAMS if settings.cameras.on or stream != "video"]
         unused = unused_clauses(settings.link_spec(), [("to_operator", stream) for stream in sent])
         for text in unused:
@@ -91,7 +98,7 @@ def command(arguments: Sequence[str], adapt: Callable[[RobotParts], Adapted] = a
             now_s = loop.clock.now()
             cameras.update(now_s, now_s, (), expected=True)
         warm_up(lambda ready, of: process.note(_COMPILING.format(ready, of)), parts.kernels)
-        drivers.wait()
+        drivers.wait(write_audit)
         if recording is not None:
             also = {"kernels": kernel_digests(), "notes": parts.notes}
             recording.begin(provenance(settings, epoch, clock_domain()) | also)
@@ -105,7 +112,7 @@ def command(arguments: Sequence[str], adapt: Callable[[RobotParts], Adapted] = a
             if settings.insecure and settings.keys is None:
                 process.note(_OPEN_TO_ALL)
             status.event("listening", control=at.control, view=at.view)
-            turns = RobotTurns(settings, core, view, cameras, door, process, drivers, physics, log)
+            turns = RobotTurns(settings, core, view, cameras, door, process, drivers, physics, write_audit)
             process.stack.enter_context(late_kernels(turns.note_late))
             return turns
 

@@ -1,7 +1,7 @@
 """Work of the robot side in each turn of the loop: sockets and clocks around the core."""
 
 import secrets
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, Final
 
 from msgspec.structs import replace
@@ -12,7 +12,6 @@ from common.sockets.door.client import Door
 from common.status.statuses import RobotStatus
 from robot_side.core.robot_side import RobotSide
 from robot_side.drivers.remote.connected_drivers import ConnectedDrivers
-from robot_side.reporting.audit import Audit, Log
 from robot_side.reporting.link_reporter import LinkReporter
 from robot_side.reporting.sending import Sending
 from robot_side.settings import RobotSettings
@@ -39,11 +38,11 @@ class RobotTurns:
         process: Process,
         drivers: ConnectedDrivers,
         physics: PhysicsTime,
-        log: Log | None = None,
+        write_audit: Callable[[], None],
     ) -> None:
-        """cameras: None if no pictures are made. log: audit log; None without one."""
+        """cameras: None if no pictures are made. write_audit: adds what happened to the audit log, if there is one."""
         self._process, self._core, self._door, self._drivers = process, core, door, drivers
-        self._audit = None if log is None else Audit(log)
+        self._write_audit = write_audit
         core.parts.arm.give_way(process.loop.clock)
         self._times = TickTimes(process.loop, core.parts.arm, physics, process.note, settings.seed)
         self._sending = Sending(settings.link_spec(), door, secrets.randbits(32))
@@ -97,10 +96,7 @@ class RobotTurns:
                 process.recording.view(now_s, message.payload)
             for text in process.recording.idle(now_s, lambda: self._status(now_s)):
                 process.note(text)
-        if self._audit is not None:
-            lost = self._audit.look(self._core.session, self._door.take_events())
-            if lost is not None:
-                process.note(lost)
+        self._write_audit()
         self._sending.push(self._reporter.due(now_s), now_s)
         if process.status.due(now_s):
             process.status.show(now_s, robot=replace(self._status(now_s), **self._times.paced()))

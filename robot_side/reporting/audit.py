@@ -38,10 +38,10 @@ class Audit:
             self._names.pop(event.peer, None)
         self._log.note(event.kind, who=event.who, where=event.where)
 
-    def look(self, session: OperatorSession, events: Sequence[Event]) -> str | None:
+    def look(self, session: OperatorSession, events: Sequence[Event]) -> list[str]:
         """Log `events` at the ports, and what changed in the session: the lease's owner, whether the arm is armed.
 
-        Return a line once events are lost.
+        Return lines to show: that events are lost, once.
         """
         for event in events:
             self._at_the_door(event)
@@ -59,7 +59,7 @@ class Audit:
             elif armed_before:
                 stops = session.safety.stops
                 self._log.note("disarmed", why=str(stops[-1][1]) if stops else "")
-        return "--audit: events are lost, as the disk refuses them" if self._log.take_failure() else None
+        return ["--audit: events are lost, as the disk refuses them"] if self._log.take_failure() else []
 
     def _note(self, event: str, peer: bytes) -> None:
         who, where = self._names.get(peer, ("", ""))

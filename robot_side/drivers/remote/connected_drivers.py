@@ -55,8 +55,11 @@ class ConnectedDrivers:
             self._objects = RemoteObjects(port, roles, sd_m, self._note)
         return self._objects
 
-    def wait(self) -> None:
-        """Wait for the arm's first state and the first objects, however long; a signal ends the wait."""
+    def wait(self, meanwhile: Callable[[], object]) -> None:
+        """Wait for the arm's first state and the first objects, however long; a signal ends the wait.
+
+        meanwhile: called some 100 times a second.
+        """
         begin = {
             flag: part.begin if isinstance(part, RemoteArm) else part.exchange
             for flag, part in (("--arm", self._arm), ("--objects", self._objects))
@@ -68,6 +71,7 @@ class ConnectedDrivers:
                 if flag not in reported:
                     reported.add(flag)
                     self._note(f"waiting for {_AWAITED[flag]} at {self._ports[flag].endpoint}")
+            meanwhile()
             self._ports[waiting[0]].wait(_TURN_S)
 
     def summary(self) -> dict[str, Any]:

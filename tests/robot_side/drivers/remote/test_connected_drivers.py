@@ -32,7 +32,9 @@ def test_a_robot_side_waits_for_both_and_knows_no_truth(scene: Scene) -> None:
         assert parts.notes[0].startswith("the driver's joints, in this order: shoulder_pan, shoulder_lift")
         arm_at, objects_at = (port.endpoint for port in drivers._ports.values())
         with running("example_arm.py", arm_at), running("example_objects.py", objects_at):
-            drivers.wait()
+            meanwhile: list[int] = []
+            drivers.wait(lambda: meanwhile.append(1))
+            assert meanwhile  # The audit log is written while nobody drives yet.
             robot, port = RobotSide(parts), drivers._ports["--arm"]
             for _ in range(200):
                 now_s = port.wait(0.001)
