@@ -22,12 +22,11 @@ from robot_side.drivers.mujoco.viewpoints import first_person_eye, overview_eye
 from robot_side.drivers.remote.connected_drivers import ConnectedDrivers, driver_ports
 from robot_side.parts import build_parts
 from robot_side.recording.recorder import RobotEncoder, RobotRecorder
-from robot_side.reporting.audit import Audit
 from robot_side.settings import RobotSettings
 from robot_side.tick.events import Listener
 from robot_side.tick.outgoing import SENT_STREAMS
 from robot_side.tick_times import PhysicsTime
-from robot_side.turns import RobotTurns
+from robot_side.turns import RobotTurns, audit_writer
 from robot_side.viewing.perceived_shapes import PerceivedModel
 from robot_side.viewing.pictures import Cameras
 from robot_side.viewing.scene_view import SceneView
@@ -83,12 +82,7 @@ def command(arguments: Sequence[str], adapt: Callable[[RobotParts], Adapted] = a
         core_parts, others = adapt(parts)
         physics = PhysicsTime(loop.clock, settings.seed)
         core = RobotSide(core_parts, [physics, *recorder, *others])
-        audit = None if log is None else Audit(log)
-
-        def write_audit() -> None:
-            for text in [] if audit is None else audit.look(core.session, door.take_events()):
-                process.note(text)
-
+        write_audit = audit_writer(log, core, door, process.note)
         sent = [stream for stream in SENT_STREAMS if settings.cameras.on or stream != "video"]
         unused = unused_clauses(settings.link_spec(), [("to_operator", stream) for stream in sent])
         for text in unused:

@@ -12,6 +12,7 @@ from common.sockets.door.client import Door
 from common.status.statuses import RobotStatus
 from robot_side.core.robot_side import RobotSide
 from robot_side.drivers.remote.connected_drivers import ConnectedDrivers
+from robot_side.reporting.audit import Audit, Log
 from robot_side.reporting.link_reporter import LinkReporter
 from robot_side.reporting.sending import Sending
 from robot_side.settings import RobotSettings
@@ -23,6 +24,17 @@ from robot_side.viewing.view_scheduler import ViewScheduler
 _LATE: Final = (
     "{} is compiled only now, which may stop the arm for seconds: a defect of this program, please report this line"
 )
+
+
+def audit_writer(log: Log | None, core: RobotSide, door: Door, note: Callable[[str], None]) -> Callable[[], None]:
+    """Return a function that adds to `log` what happened since its last call. note: called once events are lost."""
+    audit = None if log is None else Audit(log)
+
+    def write() -> None:
+        for text in [] if audit is None else audit.look(core.session, door.take_events()):
+            note(text)
+
+    return write
 
 
 class RobotTurns:

