@@ -242,7 +242,9 @@ class OperatorSide:
         mean_s, screen, update, standing = self.link.delay.mean, self.screen, self.stiffness, self._standing
         intent, rendering = self.hands.present(now_s), self.haptics.rendering
         order, linked = -1 if self.settings.swap_sides else 1, self.newest_stiffness.within(STIFFNESS_EXPIRES_S, now_s)
-        left, right = ((None, None) if update is None else (update.l2.stiffness, update.r2.stiffness))[::order]
+        led = (None, None) if update is None else (update.l2.course_stiffness, update.r2.course_stiffness)
+        left, right = led[::order]
+        meets = (None, None) if intent is None else self.haptics.meets(intent.raw)
         left_pulled, right_pulled = ((None, None) if intent is None else (intent.l2, intent.r2))[::order]
         link = self._standing.status_fields(now_s, linked=linked, heard=self.newest_stiffness.count > 0)
         seen = screen if link["link"] is LinkState.UP else None
@@ -251,8 +253,10 @@ class OperatorSide:
             **link,
             state=None if update is None else update.state,
             stopped_because=standing.stop_reason if self.newest_stiffness.stopped or standing.was_not_armed else None,
-            l2=left,
-            r2=right,
+            l2_course_stiffness=left,
+            r2_course_stiffness=right,
+            l2_meets=meets[0],
+            r2_meets=meets[1],
             l2_pulled=left_pulled,
             r2_pulled=right_pulled,
             l2_free=rendering.l2.free_travel,

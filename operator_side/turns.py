@@ -179,10 +179,12 @@ class OperatorTurns:
         if (trouble := self._sockets.trouble) is not None and status.link is not LinkState.UP:
             link = LinkState.REFUSED if self._sockets.key_refused else status.link
             status = replace(status, link=link, link_reason=trouble)
+        driven = self._person is not None and self._person.source is InputSource.BROWSER
         return replace(
             status,
             controller=self._connection.state,
             triggers_released=None if controller is None else controller.device.released,
+            stop_reset=driven and self._pages.may_drive and not self._pages.reset_first,
             person=None if self._person is None else self._person.doing,
             motion_period_ms=1e3 * self._process.loop.pacer.period_s,
             motion_overruns=self._process.loop.pacer.overruns,

@@ -10,6 +10,8 @@ from common.status.phase import phase_of
 from common.status.statuses import OperatorStatus, RobotStatus
 
 _LARGEST = 1e300
+_STRONGEST = 8
+UNNAMED = "an object"
 SLOW = 0.9
 """Speed of the simulation, as a share of real time, below which the live line shows it."""
 
@@ -21,7 +23,8 @@ class TriggerView(NamedTuple):
     pulled: float | None
     """Calibrated travel, 0 to 1."""
     resists: float | None
-    """Stiffness, 0 to 1; 0 while the arm is not armed, because the trigger is free then."""
+    """Share of the strongest effect that the finger meets now, 0 to 1. Where nothing can be met (no haptics) or it is
+    unknown (a robot side alone): stiffness to which the present course leads. 0 while the arm is not armed"""
 
 
 class LiveView:
@@ -35,18 +38,23 @@ class LiveView:
         self.side, self.scene = first or self.operator, robot or self.operator
         """`side`: for controller and link; the operator side's status, or the robot side's if there is no other.
         `scene`: for objects; the robot side's status, or the operator side's if there is no other."""
-        side, free = self.side, self.side.state not in (None, "armed")
+        side, hands = self.side, self.operator
         self.armed = side.state == "armed"
         self.triggers = (
-            TriggerView("L2", number(side.l2_pulled), 0.0 if free else number(side.l2)),
-            TriggerView("R2", number(side.r2_pulled), 0.0 if free else number(side.r2)),
+            TriggerView("L2", number(side.l2_pulled), self._resists(hands.l2_meets, side.l2_course_stiffness)),
+            TriggerView("R2", number(side.r2_pulled), self._resists(hands.r2_meets, side.r2_course_stiffness)),
         )
         held = self.scene.holding
-        self.holding = held if isinstance(held, str) else "something" if held else None
-        """Name of the object between the fingers, "something" if the name is unknown, None for no object."""
+        self.holding = held if isinstance(held, str) else UNNAMED if held else None
+        """Name of the object between the fingers, UNNAMED if the name is unknown, None for no object."""
         self.hindrance = self.scene.hindrance
         """Cause for which the arm does not follow the command, in words; None if it follows"""
         self.stands = ", it stands" if self.scene.stands else ""
+
+    def _resists(self, meets: int | None, course_stiffness: float | None) -> float | None:
+        if self.side.state not in (None, "armed"):
+            return 0.0
+        return number(course_stiffness) if meets is None or not self.operator.haptics else meets / _STRONGEST
 
 
 def number(value: float | None) -> float | None:

@@ -211,8 +211,9 @@ class TriggerField(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_
     displacement_m: float
     """δ along the trigger, as the robot side computes it: v t_d (eq. 8); v_max t_d while the commands under way are
     unknown."""
-    stiffness: float
-    """Stiffness s(δ) by `fast_m`, 0 to 1."""
+    course_stiffness: float
+    """Stiffness s(δ) to which the present course leads, by `fast_m` after the advance `displacement_m`, 0 to 1; not
+    what the trigger meets now."""
 
     def __post_init__(self) -> None:
         rising("fast_m", self.fast_m)
@@ -220,7 +221,7 @@ class TriggerField(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_
         in_range("full_speed_m_s", _SLOWEST, FARTHEST_M, self.full_speed_m_s)
         in_range("acceleration_m_s2", _SLOWEST, 1e6, self.acceleration_m_s2)
         in_range("displacement_m", -FARTHEST_M, FARTHEST_M, self.displacement_m)
-        in_range("stiffness", 0.0, 1.0, self.stiffness)
+        in_range("course_stiffness", 0.0, 1.0, self.course_stiffness)
 
 
 class StiffnessUpdate(Message, frozen=True, tag="stiffness"):
@@ -273,9 +274,11 @@ class Telemetry(Message, frozen=True, tag="telemetry", array_like=False):
     gripper_opening_m: Annotated[float, Meta(ge=0.0, le=10.0)]
     holding: bool
     enlargement_m: _Far
-    """Largest D_σ of the gripper's spheres; 0 before the loop age is known."""
-    l2: Share
-    r2: Share
+    """Enlargement of the gripper along the motion, D_incr = |v| t_d + D_σ (eq. 10); 0 before the loop age is known."""
+    l2_course_stiffness: Share
+    """Stiffness s(δ) to which the present course along L2 leads, 0 to 1"""
+    r2_course_stiffness: Share
+    """Stiffness s(δ) to which the present course along R2 leads, 0 to 1"""
     base_turn_rad: _Turn = 0.0
     """Angle across the approach axis from the tool's right to the base's, positive towards the tool's up"""
     camera_turn_rad: _Turn = 0.0

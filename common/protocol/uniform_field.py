@@ -21,5 +21,5 @@ def uniform_field(strength: int, full_speed_m_s: float = 0.25, acceleration_m_s2
         full_speed_m_s=full_speed_m_s,
         acceleration_m_s2=acceleration_m_s2,
         displacement_m=0.0,
-        stiffness=strength / STRENGTHS,
+        course_stiffness=strength / STRENGTHS,
     )

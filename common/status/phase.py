@@ -9,6 +9,7 @@ from common.status.statuses import OperatorStatus, RobotStatus
 _UP_TO_ARMED = (None, Doing.RESTING, Doing.ARMING)
 """Actions of the simulated person until they have seen that the arm is armed."""
 _LOST = (Phase.LINK_LOST, Phase.REFUSED, Phase.CONTROLLER_LOST)
+_READY = (SessionState.READY, SessionState.STOPPED_READY)
 _NOBODY = OperatorStatus()
 
 
@@ -31,6 +32,8 @@ def phase_of(robot: RobotStatus | None, operator: OperatorStatus | None) -> Phas
     if side is None:
         return PhaseFacts()
     link, state, because = side.link, side.state, (robot or side).stopped_because
+    if state == "stopped" and hands.stop_reset:
+        state, because = "disarmed", None
     alarms: tuple[tuple[bool, Phase, str | None], ...] = (
         (link is LinkState.LOST, Phase.LINK_LOST, hands.link_reason),
         (link is LinkState.REFUSED, Phase.REFUSED, hands.link_reason),
@@ -45,7 +48,7 @@ def phase_of(robot: RobotStatus | None, operator: OperatorStatus | None) -> Phas
         (hands.controller is ConnectionState.ABSENT, Phase.NO_CONTROLLER, None),
         (state == "armed" and hands.person in _UP_TO_ARMED, Phase.ARMED, None),
         (hands.person is not None, Phase.BUSY, None),
-        (state == "disarmed" and side.owner is SessionState.READY, Phase.READY_TO_ARM, None),
+        (state == "disarmed" and side.owner in _READY, Phase.READY_TO_ARM, None),
         (state == "disarmed", Phase.DISARMED, None),
         (True, Phase.STARTING, None),
     )

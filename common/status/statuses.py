@@ -13,9 +13,8 @@ from common.protocol.messages import MotionState
 from common.protocol.session import SessionState
 from common.status.codes import ConnectionState, Doing, LinkState, Sight
 
-_KEYS: Final = {
-    f"{name.lower()}{figure}": f"{name}{figure}" for name in ("L2", "R2") for figure in ("", "_pulled", "_free")
-}
+_FIGURES: Final = ("meets", "course_stiffness", "pulled", "free")
+_KEYS: Final = {f"{name.lower()}_{figure}": f"{name}_{figure}" for name in ("L2", "R2") for figure in _FIGURES}
 """JSON keys, by field: the triggers are named L2 and R2, as on the controller."""
 
 
@@ -30,12 +29,14 @@ class SideStatus(msgspec.Struct, frozen=True, kw_only=True, rename=_KEYS):
     owner: SessionState | None = None
     """In the robot side's status: session state of the lease's owner, None without an owner. In the operator side's:
     its own session state"""
-    l2: float | None = None
-    """Stiffness of L2, 0 to 1"""
-    r2: float | None = None
+    l2_course_stiffness: float | None = None
+    """Stiffness s(δ) to which the present course along L2 leads, 0 to 1; not what the trigger meets now"""
+    r2_course_stiffness: float | None = None
+    """Stiffness s(δ) to which the present course along R2 leads, 0 to 1; not what the trigger meets now"""
     l2_pulled: float | None = None
     """Calibrated travel of L2, 0 to 1"""
     r2_pulled: float | None = None
+    """Calibrated travel of R2, 0 to 1"""
     delay_ms: float | None = None
     """One-way delay from the other side to this one"""
     target: str | UnsetType | None = UNSET
@@ -45,11 +46,15 @@ class SideStatus(msgspec.Struct, frozen=True, kw_only=True, rename=_KEYS):
     hindrance: str | None = None
     """Cause for which the arm does not follow the command, in words"""
     rate_kbit_s: float | None = None
-    """This field and the next four: as in LinkReport"""
+    """Rate that the rate control allows for all messages of the robot side together"""
     queue_ms: float | None = None
+    """Queueing delay of the robot side's messages"""
     lost_percent: float | None = None
+    """Share of the packets to the lease's owner that the kernel sent again"""
     pictures: str | None = None
+    """Rate and quality of the pictures, in words"""
     held_back: str | None = None
+    """Streams of which messages were held back, and why, in words; empty for none"""
     offset_s: float | None = None
     """Clock of the other side minus ours"""
 
@@ -58,11 +63,13 @@ class RobotStatus(SideStatus, frozen=True, kw_only=True):
     """Status of the robot side."""
 
     observers: int = 0
+    """Number of operators who wait for the lease"""
     refused: int = 0
     """Number of operators that were refused"""
     loop_age_ms: float | None = None
-    """Loop age t_d that the law assumes"""
+    """Loop age t_d that the law assumes (eq. 8)"""
     enlargement_mm: float | None = None
+    """Enlargement of the gripper along the motion, D_incr = |v| t_d + D_σ (eq. 10)"""
     holding: str | None = None
     """Object between the fingers"""
     nearest: str | None = None
@@ -70,15 +77,18 @@ class RobotStatus(SideStatus, frozen=True, kw_only=True):
     nearest_mm: float | None = None
     """Distance from the gripper's surface to the nearest object"""
     target_mm: float | None = None
+    """Distance from the gripper's surface to the target"""
     tick_us: float | None = None
-    """This field and the next five are of the ticks since the previous status. They are known only if the side runs in
-    its own process"""
+    """Median duration of the ticks since the previous status; None unless the side runs in its own process, like the
+    next five"""
     tick_p99_us: float | None = None
+    """99th percentile of the ticks' durations"""
     period_ms: float | None = None
     """Present period of the robot side's turns: the one asked for, or a longer one if the machine cannot keep it"""
     overruns: int | None = None
     """Number of missed deadlines of turns, since the start"""
     late_us: float | None = None
+    """Greatest lateness of a turn"""
     real_time: float | None = None
     """Speed of the simulation, as a share of real time"""
 
@@ -93,30 +103,42 @@ class OperatorStatus(SideStatus, frozen=True, kw_only=True):
     waiting: int | None = None
     """Number of observers"""
     haptics: bool = True
-    """Whether the triggers are stiffened; if not, L2 and R2 are the stiffnesses that they would have"""
+    """Whether the triggers are stiffened; if not, they meet 0"""
     speed_scale: float = 1.0
     """Share of the full speed that full travel commands"""
     stick_frame: str = "tool"
     """Frame in which the sticks move and turn the tool: tool, base or camera"""
     feel: Sight | None = None
+    """Whether there is a recent trigger field"""
+    l2_meets: int | None = None
+    """Strength of L2's zone at the present travel, 0 to 8: what the finger feels now; None without a controller"""
+    r2_meets: int | None = None
+    """Strength of R2's zone at the present travel, 0 to 8: what the finger feels now; None without a controller"""
     l2_free: float | None = None
-    """Calibrated travel of L2 at which its stiffness begins, 0 to 1"""
+    """Calibrated travel of L2 at which its first stiff zone begins, 0 to 1"""
     r2_free: float | None = None
+    """Calibrated travel of R2 at which its first stiff zone begins, 0 to 1"""
     target_centre_mm: float | None = None
     """Distance from the point between the fingertips to the target's centre"""
     holding: bool | None = None
+    """Whether an object is between the fingers"""
+    stop_reset: bool = False
+    """Whether a page drives and no stop waits for its reset: a stopped arm then counts as disarmed"""
     controller: ConnectionState | None = None
-    """This field and those below are known only if the side runs in its own process"""
+    """State of the controller's connection; None unless the side runs in its own process, like those below"""
     triggers_released: bool | None = None
+    """Whether the last write to the controller neither resists nor rumbles"""
     person: Doing | None = None
     """Action of the simulated person or of the page that drives"""
     motion_period_ms: float | None = None
     """Present period of the operator side's turns"""
     motion_overruns: int | None = None
+    """Number of missed deadlines of the operator side's turns, since the start"""
     queue_to_robot_ms: float | None = None
+    """Queueing delay of the operator side's messages"""
 
 
-_OPERATORS_OWN: Final = ("link", "state", "owner", "delay_ms", "L2", "R2", "L2_pulled", "R2_pulled")
+_OPERATORS_OWN: Final = ("link", "state", "owner", "delay_ms", *_KEYS.values())
 """Keys that both sides have and of which the operator side's value is used."""
 
 

@@ -164,7 +164,7 @@ def _message_difference(one: StiffnessUpdate, other: StiffnessUpdate) -> tuple[f
         return math.inf, 0.0
     eighths, metres = [8.0 * abs(one.rumble - other.rumble)], [abs(one.horizon_m - other.horizon_m)]
     for a, b in ((one.l2, other.l2), (one.r2, other.r2)):
-        eighths.append(8.0 * abs(a.stiffness - b.stiffness))
+        eighths.append(8.0 * abs(a.course_stiffness - b.course_stiffness))
         metres += [abs(x - y) for x, y in zip((*a.fast_m, *a.slow_m), (*b.fast_m, *b.slow_m), strict=True)]
         metres.append(abs(a.displacement_m - b.displacement_m))
     return max(eighths), max(metres)

@@ -189,8 +189,10 @@ def _vectors(joined: Joined) -> dict[str, dict[str, str]]:
         "observation.velocity": velocity,
         "action": _ACTION,
     }
-    if "stiffness.r2.stiffness" in joined.columns():
-        vectors["observation.stiffness"] = {f"{side}_stiffness": f"stiffness.{side}.stiffness" for side in ("l2", "r2")}
+    if "stiffness.r2.course_stiffness" in joined.columns():
+        vectors["observation.course_stiffness"] = {
+            f"{side}_course_stiffness": f"stiffness.{side}.course_stiffness" for side in ("l2", "r2")
+        }
         vectors["observation.onset_distances"] = {
             f"{side}_{kind}_{strength + 1}_m": f"stiffness.{side}.{kind}_m.{strength}"
             for side in ("l2", "r2")
@@ -209,8 +211,8 @@ def _first_whole_row(
 ) -> int:
     """Return the first row from which every required column has a value and every camera a picture."""
     needed = [*vectors["observation.state"].values(), *vectors["action"].values()]
-    if "observation.stiffness" in vectors:
-        needed += vectors["observation.stiffness"].values()
+    if "observation.course_stiffness" in vectors:
+        needed += vectors["observation.course_stiffness"].values()
     begins = [int(np.argmax(np.isfinite(joined.numbers(column)))) for column in needed]
     begins += [int(np.searchsorted(np.array(joined.times_s), found[0].time_s)) for found in seen.values()]
     first = max(begins)

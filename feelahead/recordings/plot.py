@@ -148,10 +148,11 @@ def _enlargement(_: Any, axis: Any, joined: Joined, times_s: FloatArray) -> None
     if of_objects:
         sums = np.nansum([joined.numbers(column) for column in of_objects], axis=0)
         axis.plot(times_s, np.cbrt(sums), color=_PURPLE, lw=0.8, label="overlap, edge of a cube of it")
-    title = "Enlargement and its terms, overlap, and the strength s(δ) along each trigger"
+    title = "Enlargement and its terms, overlap, and the stiffness s(δ) to which the course leads"
     axis.set(ylabel="enlargement (mm)", title=title)
     other = axis.twinx()
-    strengths = [(f"stiffness.{side}.stiffness", 1.0, color, f"s(δ) of {side.upper()}") for side, _, color in _SIDES]
+    course = "stiffness.{}.course_stiffness".format
+    strengths = [(course(side), 1.0, color, f"s(δ), course of {side.upper()}") for side, _, color in _SIDES]
     _curves(other, joined, times_s, *strengths)
     other.set(ylim=(0.0, 1.05), ylabel="s(δ)")
     handles, labels = axis.get_legend_handles_labels()

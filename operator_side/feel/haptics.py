@@ -6,7 +6,7 @@ from typing import Any, Final
 
 from common.protocol.messages import Compensation, MotionCommand, StiffnessUpdate
 from common.reaction import WRITE_S
-from operator_side.controller.feel import RELEASED, Feel
+from operator_side.controller.feel import FREE_TRIGGER, RELEASED, Feel, met
 from operator_side.feel.blindness import Blindness
 from operator_side.feel.commands_under_way import CommandsUnderWay, Displacement, Report
 from operator_side.feel.path_ahead import CourseOnMap
@@ -146,6 +146,10 @@ class Haptics:
         if course is None:
             return None
         return CourseOnMap(mapped.around, mapped.horizon_m, course, self._commands.sticks_at(now_s))
+
+    def meets(self, raw: tuple[float, float]) -> tuple[int, int]:
+        """Return the strengths, 0 to 8, that fingers at the raw travels of L2 and R2 meet in the zones last written."""
+        return met(self.written.l2 or FREE_TRIGGER, raw[0]), met(self.written.r2 or FREE_TRIGGER, raw[1])
 
     def needed_m(self, update: StiffnessUpdate, pulled: tuple[float, float], now_s: float) -> tuple[float, float]:
         """Compute D_z of `feel/zones.py` at the present travel, for the retreating and for the advancing trigger.

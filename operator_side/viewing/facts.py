@@ -25,11 +25,12 @@ class TriggerFacts(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     zones: Ten
     """Strength of each of the ten zones as last written to the controller, 0 to 8"""
     meets: int
-    """Strength of the zone at the present travel, 0 to 8"""
+    """Strength of the zone at the present travel, 0 to 8: what the finger feels now"""
     free: float
     """Calibrated travel, 0 to 1, at which the first zone with a strength above 0 begins"""
-    stiffness: float | None
-    """Stiffness s(δ) of §4.2, computed by the robot side, 0 to 1; None without a stiffness field"""
+    course_stiffness: float | None
+    """Stiffness s(δ) of §4.2 to which the present course leads, by the robot side, 0 to 1; None without a field. What
+    the trigger meets now is `meets`"""
     needed_m: float | None
     """Distance D_z (`feel/zones.py`) that must be felt ahead at the present travel; None without a field"""
     fast_m: tuple[float, ...]

@@ -8,7 +8,7 @@ import msgspec
 
 from common.status.codes import InputSource
 from common.status.statuses import OperatorStatus
-from operator_side.controller.feel import FREE_TRIGGER, met
+from operator_side.controller.feel import FREE_TRIGGER
 from operator_side.core import OperatorSide
 from operator_side.viewing.facts import (
     DelayFacts,
@@ -42,7 +42,7 @@ def operator_facts(
     status: `core.status(now_s)`, completed with the fields that only the process knows.
     """
     update, written, lease = core.stiffness, core.haptics.written, core.lease
-    pulled = [status.l2_pulled, status.r2_pulled]
+    pulled, meets = [status.l2_pulled, status.r2_pulled], [status.l2_meets, status.r2_meets]
     order = -1 if core.settings.swap_sides else 1
     needed: list[float | None] = [None, None]
     fields = [None, None] if update is None else [update.l2, update.r2][::order]
@@ -60,9 +60,9 @@ def operator_facts(
                 travel=travel,
                 raw=None if travel is None else raw[k],
                 zones=zones,
-                meets=0 if travel is None else met(zones, raw[k]),
+                meets=meets[k] or 0,
                 free=rendered.free_travel,
-                stiffness=None if field is None else field.stiffness,
+                course_stiffness=None if field is None else field.course_stiffness,
                 needed_m=needed[k],
                 fast_m=() if field is None else field.fast_m,
                 slow_m=() if field is None else field.slow_m,

@@ -225,8 +225,8 @@ class RobotSide:
         apart = perceived_distances(*spheres, self.parts.surroundings.see(objects), target, self.grip.index)
         return msgspec.structs.replace(
             status,
-            l2=sensed.l2.stiffness,
-            r2=sensed.r2.stiffness,
+            l2_course_stiffness=sensed.l2.course_stiffness,
+            r2_course_stiffness=sensed.r2.course_stiffness,
             enlargement_mm=1e3 * sensed.enlargement_m if situation.loop_age_settled else None,
             holding=None if self.held is None else self.held[:SHOWN_NAME],
             stands=self.grip.touchdown.stands,

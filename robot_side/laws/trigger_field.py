@@ -25,7 +25,7 @@ def trigger_field(onsets_m: FloatArray, able: Ability, displacement_m: float, ho
         full_speed_m_s=able.full_speed_m_s,
         acceleration_m_s2=able.acceleration_m_s2,
         displacement_m=displacement_m,
-        stiffness=bisect_right(fast_m, displacement_m) / STRENGTHS,
+        course_stiffness=bisect_right(fast_m, displacement_m) / STRENGTHS,
     )
 
 

@@ -111,7 +111,7 @@ class RunFigures(Listener):
         Stiffness counts as 0 unless the arm is armed, as nobody feels it. settled: whether the loop age is; until then
         the enlargement is unknown.
         """
-        self._warns = max(sensed.rumble, sensed.l2.stiffness, sensed.r2.stiffness) > 0.0
+        self._warns = max(sensed.rumble, sensed.l2.course_stiffness, sensed.r2.course_stiffness) > 0.0
         self._rows.append((sensed, armed, settled))
         self.ticks += 1
         if len(self._rows) == _MOST_ROWS:
@@ -124,8 +124,8 @@ class RunFigures(Listener):
             [sensed.enlargement_m for sensed, _, settled in rows if settled and sensed.tool_speed_m_s > MOVING_M_S]
         )
         self._overlap.extend([sensed.overlap_m3 for sensed, _, _ in rows])
-        self._l2.extend([armed * sensed.l2.stiffness for sensed, armed, _ in rows])
-        self._r2.extend([armed * sensed.r2.stiffness for sensed, armed, _ in rows])
+        self._l2.extend([armed * sensed.l2.course_stiffness for sensed, armed, _ in rows])
+        self._r2.extend([armed * sensed.r2.course_stiffness for sensed, armed, _ in rows])
 
     def truth(self, truth: Truth, roles: Mapping[str, Role], now_s: float) -> None:
         """Add true distances and contacts from the simulation; count the contacts that begin."""

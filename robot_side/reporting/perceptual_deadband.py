@@ -130,7 +130,7 @@ def _matters(
         moved_m -= _braking_m(sign * sensed.speed_m_s, now.acceleration_m_s2)
         if _is_wrong(now, then, moved_m, sensed.horizon_m, patient):
             return True
-        shown |= int(_EIGHTHS * now.stiffness) != int(_EIGHTHS * then.stiffness)
+        shown |= int(_EIGHTHS * now.course_stiffness) != int(_EIGHTHS * then.course_stiffness)
     return not patient and shown
 
 
@@ -207,4 +207,5 @@ def _lengths(view: Telemetry) -> tuple[float, ...]:
 
 
 def _shares(view: Telemetry) -> tuple[float, ...]:
-    return view.l2, view.r2, view.undone, *view.up_in_tool, view.base_turn_rad, view.camera_turn_rad
+    course = view.l2_course_stiffness, view.r2_course_stiffness
+    return *course, view.undone, *view.up_in_tool, view.base_turn_rad, view.camera_turn_rad

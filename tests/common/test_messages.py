@@ -321,7 +321,7 @@ REFUSED: tuple[tuple[Any, dict[str, Any], str], ...] = (
     (field(onsets(0.1)), {"full_speed_m_s": 0.0}, "full_speed_m_s = 0"),
     (field(onsets(0.1)), {"acceleration_m_s2": math.inf}, "acceleration_m_s2 = inf"),
     (field(onsets(0.1)), {"displacement_m": math.nan}, "displacement_m = nan"),
-    (field(onsets(0.1)), {"stiffness": 1.1}, "stiffness = 1.1"),
+    (field(onsets(0.1)), {"course_stiffness": 1.1}, "course_stiffness = 1.1"),
     (SCENE, {"link_poses": b"123"}, "link_poses or spheres ends within a row; valid: whole rows"),
     (SCENE, {"spheres": b"123"}, "link_poses or spheres ends within a row; valid: whole rows"),
     (SCENE, {"object_poses": b""}, "object_poses has .* bytes; valid: "),
@@ -388,4 +388,4 @@ def test_a_uniform_field_has_its_strength_at_every_distance(strength: int) -> No
     for metres in (made_field.fast_m, made_field.slow_m):
         assert sum(way <= -FAR_M for way in metres) == strength
         assert sum(way >= FAR_M for way in metres) == STRENGTHS - strength
-    assert made_field.stiffness == strength / STRENGTHS
+    assert made_field.course_stiffness == strength / STRENGTHS

@@ -36,7 +36,7 @@ def running(compose: Compose) -> Engine:
     began_s = time.monotonic()
     compose.engine.compose("up", "--detach", settings=compose.settings)
     operator = Watched(compose.engine, "operator")
-    operator.wait_for("stiffened", lambda event: (event.get("R2") or 0.0) > 0.0, 120.0)
+    operator.wait_for("stiffened", lambda event: (event.get("R2_course_stiffness") or 0.0) > 0.0, 120.0)
     print(f"{time.monotonic() - began_s:.1f} s from `up` to the first stiffness (asked: 20 s)")
     return compose.engine
 
@@ -89,7 +89,7 @@ def test_the_robot_side_killed(running: Engine) -> None:
     operator.wait_for("without a link", lambda event: event.get("event") == "status" and event.get("link") != "up")
     heard = operator.wait_for("link up", link_up)
     without = [event for event in heard if event.get("event") == "status" and event.get("link") != "up"]
-    assert not any(event["R2"] for event in without)
+    assert not any(event["R2_course_stiffness"] for event in without)
     robot.wait_for("started again", lambda event: event.get("event") == "listening")
     came_back_disarmed(robot)
 

@@ -51,7 +51,7 @@ def test_status_and_summary_speak_of_the_controllers_own_triggers(swapped: bool)
     assert (command.l2, command.r2) == (0.0, 1.0)
     bench.feel(6)
     status = bench.side.status(bench.now_s)
-    assert [status.l2, status.r2][::order] == [0.0, 0.75]
+    assert [status.l2_course_stiffness, status.r2_course_stiffness][::order] == [0.0, 0.75]
     assert [status.l2_pulled, status.r2_pulled][::order] == [0.0, 1.0]
     assert [status.l2_free, status.r2_free][::order] == [1.0, 0.0]
     assert status.feel is Sight.SEEING

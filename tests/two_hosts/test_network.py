@@ -111,6 +111,6 @@ def stopped(lan: Lan, for_s: float) -> None:
 
 def all_flows(lan: Lan) -> None:
     """Wait until the operator side gets stiffness and telemetry, and a trigger becomes stiff."""
-    lan.until("operator", "stiffness and telemetry", lambda status: status["R2"] is not None and "target" in status)
+    lan.until("operator", "stiffness and telemetry", lambda one: one["R2_meets"] is not None and "target" in one)
     lan.moving()
-    lan.until("operator", "a stiff trigger", lambda status: (status["R2"] or 0.0) + (status["L2"] or 0.0) > 0.0)
+    lan.until("operator", "a stiff trigger", lambda one: (one["R2_meets"] or 0) + (one["L2_meets"] or 0) > 0)

@@ -20,7 +20,7 @@ SILENT_AFTER_S: Final = 0.5
 """Age of the facts above which an alarm says that there is no news, in seconds"""
 _KEPT: Final = 200
 """Number of facts in a curve (20 s at ten a second), and number of notes kept"""
-_CURVES: Final = (("delay", "ms"), ("stiffness", ""), ("overlap", "mm³"), ("tick p99", "µs"))
+_CURVES: Final = (("delay", "ms"), ("meets", "of 8"), ("overlap", "mm³"), ("tick p99", "µs"))
 _BLOCKS: Final = " ▁▂▃▄▅▆▇█"
 _ALARM, _ARMED, _QUIET = "bold white on red", "bold black on bright_cyan", "reverse"
 _FAINT, _TITLE, _PULL, _FELT = "bright_black", "bold", "bright_cyan", "bold bright_yellow"
@@ -36,7 +36,7 @@ class Screen:
 
     def add(self, facts: OperatorFacts) -> None:
         """Show these facts, and append their figures to the curves; an unknown figure counts as 0."""
-        self.facts, stiffest = facts, max(facts.l2.stiffness or 0.0, facts.r2.stiffness or 0.0)
+        self.facts, stiffest = facts, max(facts.l2.meets, facts.r2.meets)
         ahead = (None, None) if facts.scene is None else (facts.scene.overlap_mm3, facts.scene.tick_p99_us)
         self._history.append(tuple(number(value) or 0.0 for value in (facts.to_operator.newest_ms, stiffest, *ahead)))
 
@@ -117,6 +117,7 @@ def _trigger(facts: OperatorFacts, name: str, cells: int) -> Group:
     """Draw a trigger: its travel, the strength of each zone, and the onset distances. cells: columns of one zone."""
     trigger, does = facts.l2 if name == "L2" else facts.r2, "advances" if facts.advancing == name else "retreats"
     raw, metres, cells = number(trigger.raw), number(trigger.needed_m), max(1, cells)
+    led = number(trigger.course_stiffness)
     reached = math.ceil(min(1.0, max(0.0, (raw or 0.0) * SENSED_TRAVEL)) * cells * 10)
     rest = (UNKNOWN if raw is None else "·") * (cells * 10 - reached)
     behind = " behind" if round(1e3 * (metres or 0.0)) < 0 else " ahead"
@@ -126,7 +127,7 @@ def _trigger(facts: OperatorFacts, name: str, cells: int) -> Group:
         _line((f"{name} {does}", _TITLE), f" pulled {travel} %, free to {free} %"),
         _line("finger  ", ("━" * (reached - 1) + "┫" * (reached > 0), _PULL), (rest, _FAINT)),
         _line("zones   ", *((f"{zone or '.'}".ljust(cells), _FELT if zone else "") for zone in trigger.zones)),
-        _line("meets   ", meets, f"  stiffness {_figure(trigger.stiffness)}"),
+        _line("meets   ", meets, f"   course leads to {UNKNOWN if led is None else f'{8.0 * led:.0f}'}"),
         _line("D       ", (f"{UNKNOWN if metres is None else f'{1e3 * abs(metres):.0f}'} mm", _TITLE), behind),
         _line("fast mm ", " ".join(f"{1e3 * way:z.0f}" for way in trigger.fast_m) or UNKNOWN),
         _line("slow mm ", " ".join(f"{1e3 * way:z.0f}" for way in trigger.slow_m) or UNKNOWN),

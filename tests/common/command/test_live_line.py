@@ -21,8 +21,8 @@ OPERATOR = OperatorStatus(
     state="armed",
     person=Doing.ADVANCING,
     delay_ms=12.4,
-    l2=0.0,
-    r2=0.34,
+    l2_course_stiffness=0.0,
+    r2_course_stiffness=0.34,
     l2_pulled=0.0,
     r2_pulled=0.62,
 )
@@ -49,7 +49,7 @@ views = st.builds(
     stopped_because=names,
     real_time=shares,
     delay_ms=distances_mm,
-    r2=shares,
+    r2_course_stiffness=shares,
     r2_pulled=shares,
     haptics=st.booleans(),
     nearest=names,
@@ -130,7 +130,7 @@ def resting(**changes: Any) -> LiveView:
 
 
 def advancing(**changes: Any) -> LiveView:
-    return approach(**{"nearest_mm": 80.0, "r2": 0.0} | changes)
+    return approach(**{"nearest_mm": 80.0, "r2_course_stiffness": 0.0} | changes)
 
 
 def told(*views: LiveView, step_s: float = 1.0) -> list[str]:
@@ -141,13 +141,13 @@ def told(*views: LiveView, step_s: float = 1.0) -> list[str]:
 
 def test_a_run_reads_as_a_story() -> None:
     near: dict[str, Any] = {"nearest": "carton", "nearest_mm": 10.0, "target_mm": 10.0, "r2_pulled": 0.5}
-    held = near | {"r2": 0.5, "holding": "carton"}
+    held = near | {"r2_course_stiffness": 0.5, "holding": "carton"}
     lines = told(
         resting(link=LinkState.WAITING),
         resting(),
         advancing(),
-        advancing(**near, r2=0.3),
-        advancing(**near | {"nearest_mm": -0.5, "target_mm": -0.5}, r2=1.0),
+        advancing(**near, r2_course_stiffness=0.3),
+        advancing(**near | {"nearest_mm": -0.5, "target_mm": -0.5}, r2_course_stiffness=1.0),
         advancing(**held, person=Doing.LIFTING),
         advancing(**held, person=Doing.LOWERING, stands=True),
         advancing(**held, person=Doing.LOWERING, stands=True, hindrance="joint 4 at its limit"),
@@ -164,6 +164,17 @@ def test_a_run_reads_as_a_story() -> None:
         "   7.0 s  the arm does not follow: joint 4 at its limit  (R2 pulled 50 %, nearest 10 mm)",
         "   8.0 s  LINK LOST: nothing heard; R2 yields freely, after up to 100 %; lets go of carton",
     ]
+
+
+def test_what_the_finger_meets_is_said_and_not_what_the_course_leads_to() -> None:
+    line = live_line(approach(r2_meets=8, r2_course_stiffness=0.0), 200)
+    assert "resist 0/100%" in line
+    assert "danger 0/50%" in live_line(approach(r2_meets=0, r2_course_stiffness=0.5, haptics=False), 200)
+
+
+def test_after_its_reset_a_stop_is_no_longer_said() -> None:
+    reset = approach(state="stopped", stopped_because="emergency stop", person=Doing.READY, stop_reset=True)
+    assert (reset.phase, reset.alarm, reset.border, reset.reason) == ("ready", False, "disarmed", None)
 
 
 @pytest.mark.parametrize(

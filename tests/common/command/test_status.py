@@ -25,7 +25,7 @@ def events(capsys: pytest.CaptureFixture[str]) -> list[dict[str, Any]]:
 
 
 def test_json_says_codes_and_figures_and_of_each_side_what_it_knows_better(capsys: pytest.CaptureFixture[str]) -> None:
-    robot = RobotStatus(link=LinkState.UP, state="armed", l2=0.1, target="carton", real_time=math.nan)
+    robot = RobotStatus(link=LinkState.UP, state="armed", l2_course_stiffness=0.1, target="carton", real_time=math.nan)
     operator = OperatorStatus(link=LinkState.LOST, holding=True, place=3)
     with Status("json", "robot") as status:
         status.show(0.0, robot=robot, operator=operator)
@@ -33,11 +33,12 @@ def test_json_says_codes_and_figures_and_of_each_side_what_it_knows_better(capsy
         status.event("bare")
         status.show(1.0, robot=robot)
     both, listening, bare, alone = events(capsys)
-    for name, value in {"event": "status", "link": "lost", "state": None, "L2": None, "target": "carton"}.items():
-        assert both[name] == value
+    expected = {"event": "status", "link": "lost", "state": None, "L2_course_stiffness": None, "target": "carton"}
+    assert {name: both[name] for name in expected} == expected
     assert (both["holding"], both["place"], both["real_time"]) == (None, 3, None)
     assert [listening, bare] == [{"event": "listening", "control": "tcp://127.0.0.1:5555"}, {"event": "bare"}]
-    assert (alone["link"], alone["L2"], alone["nearest_mm"], "place" in alone) == ("up", 0.1, None, False)
+    assert (alone["link"], alone["L2_course_stiffness"], alone["nearest_mm"]) == ("up", 0.1, None)
+    assert "place" not in alone
 
 
 def test_without_a_terminal_only_what_changed_is_told(capsys: pytest.CaptureFixture[str]) -> None:

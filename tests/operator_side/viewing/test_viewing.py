@@ -60,7 +60,7 @@ def felt_bench(*, swap_sides: bool = False, l2: float = 0.0, r2: float = 0.0) ->
 
 def test_before_anything_has_come_nothing_is_invented() -> None:
     facts = facts_of(Bench())
-    assert (facts.r2.travel, facts.r2.raw, facts.r2.stiffness, facts.r2.needed_m) == (None,) * 4
+    assert (facts.r2.travel, facts.r2.raw, facts.r2.course_stiffness, facts.r2.needed_m) == (None,) * 4
     assert (facts.r2.fast_m, facts.r2.zones, facts.r2.meets, facts.r2.free) == ((), (0,) * 10, 0, 1.0)
     assert (facts.field_age_ms, facts.round_trip_ms) == (None, None)
 
@@ -74,7 +74,7 @@ def test_each_trigger_is_told_as_it_is_written_and_where_the_finger_is() -> None
     assert first > 0
     assert facts.r2.free == pytest.approx(TriggerTravel().travel(first / 10 / SENSED_TRAVEL))
     assert facts.r2.meets == facts.r2.zones[int(10 * SENSED_TRAVEL * 0.8)]
-    assert (facts.l2.stiffness, facts.r2.stiffness, facts.r2.fast_m[0]) == (
+    assert (facts.l2.course_stiffness, facts.r2.course_stiffness, facts.r2.fast_m[0]) == (
         0.25,
         0.75,
         math.floor(0.04 / STEP_M) * STEP_M,

@@ -15,7 +15,7 @@ repeatable = settings(derandomize=True, deadline=None)
 
 def field(fast_m: float, slow_m: float | None = None) -> TriggerField:
     slow = fast_m if slow_m is None else slow_m
-    return TriggerField((fast_m,) * 8, (slow,) * 8, FULL_M_S, ACCELERATION, displacement_m=0.0, stiffness=0.0)
+    return TriggerField((fast_m,) * 8, (slow,) * 8, FULL_M_S, ACCELERATION, displacement_m=0.0, course_stiffness=0.0)
 
 
 def command(l2: float, r2: float) -> MotionCommand:

@@ -70,8 +70,8 @@ def test_the_stiffness_is_its_share_of_the_enlarged_gripper_in_eighths() -> None
         sensed = senses().sense(pose, walls(float(gap_m)))
         whole_m3 = ball_volume(RADIUS_M + SIGMA_M) + ball_volume(0.004 + SIGMA_M)
         share = sensed.overlap_m3 / (REFERENCE_SHARE * whole_m3)
-        assert 8.0 * sensed.r2.stiffness == round(8.0 * min(1.0, share))
-        found.add(sensed.r2.stiffness)
+        assert 8.0 * sensed.r2.course_stiffness == round(8.0 * min(1.0, share))
+        found.add(sensed.r2.course_stiffness)
     assert found == {strength / 8.0 for strength in range(9)}
     assert REFERENCE_SHARE == 0.05
 
@@ -83,9 +83,9 @@ def test_it_is_the_same_on_both_triggers_and_in_every_zone(ahead: bool) -> None:
         objects = walls(float(gap_m)) if ahead else walls(None, float(gap_m))
         sensed = senses().sense(ball_pose(), objects)
         assert sensed.l2 == sensed.r2
-        strength = round(8.0 * sensed.r2.stiffness)
+        strength = round(8.0 * sensed.r2.course_stiffness)
         assert sensed.r2 == uniform_field(strength, FULL_SPEED_M_S, ACCELERATION_M_S2)
-        found.append(sensed.r2.stiffness)
+        found.append(sensed.r2.course_stiffness)
     assert found == sorted(found, reverse=True)
     assert (found[0], found[-1]) == (1.0, 0.0)
     assert len(set(found)) >= 6
@@ -101,7 +101,7 @@ def test_what_is_ignored_or_held_overlaps_nothing() -> None:
     scene = Scene().add(Role.IGNORED).add(Role.SUPPORT).box([0.0, 0.0, 0.0], [0.1, 0.1, 0.1])
     assert senses().sense(ball_pose(), scene.objects(), held=1).overlap_m3 == 0.0
     # To the paper's law a support is like any other object.
-    assert senses().sense(ball_pose(), scene.objects()).r2.stiffness == 1.0
+    assert senses().sense(ball_pose(), scene.objects()).r2.course_stiffness == 1.0
 
 
 def test_it_looks_a_hundred_times_a_second() -> None:

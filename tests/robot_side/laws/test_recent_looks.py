@@ -102,7 +102,7 @@ def test_a_field_is_cut_to_what_is_known_and_counts_the_strengths_within_reach(
     onsets_m, (known_m, displacement_m) = random_look(rng, 0, 0.0).onsets_m, rng.uniform(-0.1, 0.3, 2).tolist()
     found = trigger_field(onsets_m, ABLE, displacement_m, known_m)
     np.testing.assert_array_equal([found.fast_m, found.slow_m], np.minimum(onsets_m, known_m))
-    assert found.stiffness == np.count_nonzero(np.minimum(onsets_m[0], known_m) <= displacement_m) / 8
+    assert found.course_stiffness == np.count_nonzero(np.minimum(onsets_m[0], known_m) <= displacement_m) / 8
     assert (found.full_speed_m_s, found.acceleration_m_s2) == (0.25, 3.0)
     reach_m = stick * (loop_s + HORIZON_S) + stick**2 / 6.0
     listed = onsets_m[1 if stick < 0.05 else 0]

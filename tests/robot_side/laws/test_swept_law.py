@@ -45,7 +45,7 @@ def test_the_horizon_is_what_a_reaction_the_loop_age_and_braking_take_and_a_litt
         assert felt.fast_m == felt.slow_m == (sensed.horizon_m,) * 8
         assert felt.full_speed_m_s == pytest.approx(FULL_SPEED_M_S)
         assert felt.acceleration_m_s2 == pytest.approx(ACCELERATION_M_S2)
-        assert felt.stiffness == 0.0
+        assert felt.course_stiffness == 0.0
 
 
 def test_nothing_is_claimed_of_what_has_not_been_looked_at() -> None:

@@ -130,7 +130,7 @@ function showFacts(message) {
   charts.delay.add(clock.nowMs, [facts.to_operator.newest_ms, facts.to_robot.newest_ms]);
   const asked = [["robot", facts.to_robot.asked], ["operator", facts.to_operator.asked]].filter(([, words]) => words);
   charts.delay.said = asked.map(([side, words]) => `emulated to the ${side}: ${words}`).join("; ");
-  charts.stiffness.add(clock.nowMs, [facts.l2.stiffness, facts.r2.stiffness]);
+  charts.stiffness.add(clock.nowMs, [facts.l2.course_stiffness, facts.r2.course_stiffness]);
   hands.show(facts);
   showCounts(facts);
 }

@@ -39,7 +39,7 @@ export class Trigger {
     this.#words[0].classList.toggle("yields", Boolean(yields));
     const mm = facts.needed_m === null ? null : Math.round(1000 * facts.needed_m);
     const ahead = mm === null ? "?" : `${Math.abs(mm)} mm ${mm < 0 ? "behind" : "ahead"}`;
-    const stiffness = facts.stiffness === null ? "?" : facts.stiffness.toFixed(2);
+    const stiffness = facts.course_stiffness === null ? "?" : facts.course_stiffness.toFixed(2);
     this.#words[1].textContent = `D = ${ahead} · s(δ) = ${stiffness}`;
   }
 }

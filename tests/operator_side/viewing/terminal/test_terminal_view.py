@@ -72,9 +72,9 @@ def test_everything_is_on_a_screen_of_the_usual_size() -> None:
     for said in (
         *(">>> ARMED  advancing >>>", "link up", "lease armed", "hands person", "mean  52.0  p99  61.0  now"),
         *("asked: delay 50ms 10ms", "round trip 101 ms", "field age 1.0 ms", "R2 advances pulled  71 %, free to 40 %"),
-        *("L2 retreats pulled   0 %, free to 100 %", ".  .  .  1  2  3  4  5  6", "meets   1 of 8  stiffness 0.71"),
+        *("L2 retreats pulled   0 %, free to 100 %", ".  .  .  1  2  3  4  5  6", "meets   1 of 8   course leads to 6"),
         *("57 mm ahead", "20 30 40 50 60 70 80 90", "nearest bottle at 34 mm", "target mug at 120 mm"),
-        *("holding nothing", "delay ", "stiffness ", "overlap ", "tick p99 ", "140 of 140 µs", "note 99 ?[2J"),
+        *("holding nothing", "delay ", "meets  ", "overlap ", "tick p99 ", "140 of 140 µs", "note 99 ?[2J"),
     ):
         assert said in text
 

@@ -228,4 +228,4 @@ def test_objects_that_all_overlap_the_gripper_cost_no_more_than_the_limit_and_th
     assert sum(after[name] - before[name] for name in ("pairs", "overlaps")) <= looks * (MOST_WORK + 2000)
     assert bench.state == "armed"
     assert "too many things overlap" in str(bench.robot.status(bench.now_s).hindrance)
-    assert operator.updates[-1].r2.stiffness == 1.0
+    assert operator.updates[-1].r2.course_stiffness == 1.0
