@@ -91,6 +91,7 @@ class MotionCommand(Message, frozen=True, tag="motion"):
     l2: float
     """Calibrated travel of the left trigger, 0 to 1."""
     r2: float
+    """Calibrated travel of the right trigger, 0 to 1."""
     lateral: Vector2 = (0.0, 0.0)
     """Left stick, right and up positive, -1 to 1 each."""
     turning: Vector2 = (0.0, 0.0)
@@ -102,7 +103,9 @@ class MotionCommand(Message, frozen=True, tag="motion"):
     arm: bool = False
     """Whether the arming button is down."""
     emergency_stop: bool = False
+    """Whether the emergency stop is down."""
     next_target: bool = False
+    """Whether the button for the next target is down."""
     home: float = 0.0
     """Share of full speed at which to move to the start pose, 0 for not at all; only while triggers and sticks rest."""
     hand_over: bool = False
@@ -200,10 +203,11 @@ class TriggerField(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_
     """Onset distances of the eight strengths along one trigger (§4.2)."""
 
     fast_m: OnsetDistances
-    """Advances from here at which strengths 1 to 8 begin, in ascending order, for fast zones; `horizon_m` for those
-    beyond the horizon. Below 0: the gripper is past the onset."""
+    """Advances from here along the trigger at which strengths 1 to 8 begin, in ascending order, for fast zones;
+    `horizon_m` for those beyond the horizon. Below 0: the gripper is past the onset."""
     slow_m: OnsetDistances
-    """As `fast_m`, for slow zones, whose commanded speed is so low that touching the target is allowed."""
+    """Advances from here along the trigger at which strengths 1 to 8 begin, for slow zones, whose commanded speed is so
+    low that touching the target is allowed."""
     full_speed_m_s: float
     """v_max: speed that a full pull commands in this pose."""
     acceleration_m_s2: float
@@ -236,6 +240,7 @@ class StiffnessUpdate(Message, frozen=True, tag="stiffness"):
     rumble: float
     """Rumble, 0 to 1 in eighths: strength in the direction of the stick; 0 while the stick rests."""
     state: MotionState
+    """State of the arm: disarmed, armed or stopped"""
     commanded_m_s: float | None = None
     """Commanded speed along R2's direction: what remains of the newest command after joint limits; 0 if the command was
     discarded or stopped. None if unknown: the arm then counts as following the command."""
@@ -262,17 +267,21 @@ class Telemetry(Message, frozen=True, tag="telemetry", array_like=False):
     """
 
     state: MotionState
+    """State of the arm: disarmed, armed or stopped"""
     tool_position_m: _Place
-    """Estimated position of the tool, in the world frame."""
+    """Estimated position (x, y, z) of the tool, in the world frame."""
     target: str | None
     """Name of the present target; None for none."""
     target_in_tool_m: _Place | None
-    """Centre of the perceived target in the tool frame; +z is the approach axis."""
+    """Centre (x, y, z) of the perceived target in the tool frame; +z is the approach axis."""
     up_in_tool: tuple[_Component, _Component, _Component]
-    """Unit vector that points up in the world, expressed in the tool frame; for an artificial horizon."""
+    """Unit vector (x, y, z) that points up in the world, in the tool frame; for an artificial horizon."""
     tool_speed_m_s: _Far
+    """Speed of the tool, in any direction"""
     gripper_opening_m: Annotated[float, Meta(ge=0.0, le=10.0)]
+    """Free gap between the fingers; 0 without a gripper"""
     holding: bool
+    """Whether an object is between the fingers"""
     enlargement_m: _Far
     """Enlargement of the gripper along the motion, D_incr = |v| t_d + D_σ (eq. 10); 0 before the loop age is known."""
     l2_course_stiffness: Share

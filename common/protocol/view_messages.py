@@ -135,20 +135,21 @@ class EnlargementTerms(msgspec.Struct, frozen=True, array_like=True, forbid_unkn
     """Terms of eq. 8-10 along one trigger's direction, for the sphere of the gripper with the largest D_σ."""
 
     sigma_m: float
-    """Enlargement D_σ in metres (eq. 9-10 of the paper)"""
+    """Enlargement D_σ along the trigger (eq. 9-10)"""
     mean_m: float
-    """Mean û·(μ_ee - μ_c) + μ_δ"""
+    """Mean error along the trigger, û·(μ_ee - μ_c) + μ_δ"""
     kinematic_sd_m: float
-    """√(ûᵀΣû), from eq. 5-7"""
+    """Standard deviation of the arm's estimate along the trigger, √(ûᵀΣû) (eq. 5-7)"""
     camera_sd_m: float
+    """Standard deviation of the camera's error, σ_c (eq. 1-2)"""
     prediction_sd_m: float
-    """σ_δ"""
+    """Standard deviation of the prediction of δ, σ_δ"""
     quantile: float
-    """Φ⁻¹(P)"""
+    """Quantile Φ⁻¹(P) of the standard normal distribution (eq. 10)"""
     loop_age_s: float
-    """t_d of eq. 8"""
+    """Loop age t_d that the law assumes (eq. 8)"""
     displacement_m: float
-    """δ as the robot side computes it (eq. 8)"""
+    """Displacement δ along the trigger, as the robot side computes it (eq. 8)"""
 
 
 class SceneState(Message, frozen=True, tag="scene"):

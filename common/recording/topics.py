@@ -9,10 +9,12 @@ from types import UnionType
 from typing import Any, Final, Literal, Union, get_args
 
 import msgspec
+from msgspec import inspect
 
 from common.episode import EpisodeMark
 from common.protocol.messages import MotionCommand, StiffnessUpdate, Telemetry
 from common.protocol.view_messages import EnlargementTerms
+from common.recording.meanings import KEPT, meanings
 from common.recording.wire import BINARY
 from common.status.statuses import OperatorStatus, RobotStatus
 
@@ -34,32 +36,44 @@ class Stamps(Moment, frozen=True):
     side: Side
     """Side that recorded the message"""
     sequence: int
+    """Number of the message in its sender's epoch, counted over all kinds of messages together"""
     sent_s: float
+    """Time at which the message entered its delay line, on the sender's monotonic clock"""
     age_ms: float | None
+    """Time since `sent_s` when it was recorded; 0 at the side that sent it"""
     loop_age_ms: float | None
+    """Time from the departure of our message that it echoes to its arrival; None at the side that sent it"""
 
 
 class ViewStamps(Moment, frozen=True):
     """Stamps of a view message."""
 
     sequence: int
+    """Number of the message in its sender's epoch, counted over all kinds of messages together"""
     sent_s: float
+    """Time at which the message entered its delay line, on the robot side's monotonic clock"""
 
 
 class Ages(Moment, frozen=True):
     """Ages of what a side uses; None while unknown."""
 
     side: Side
+    """Side that uses the data"""
     command_ms: float | None
+    """Age of the command that moves the arm, at the robot side"""
     field_ms: float | None
+    """Age of the trigger field that is felt, at the operator side"""
     frame_ms: float | None
+    """Age of the frame of perceived objects in use, at the robot side"""
 
 
 class Episode(Moment, frozen=True):
     """Mark of an episode."""
 
     side: Side
+    """Side that recorded the mark"""
     mark: EpisodeMark
+    """Mark: start, success, failure, discard or reset"""
 
 
 class Terms(msgspec.Struct, frozen=True):
@@ -74,7 +88,9 @@ class ObjectOverlap(msgspec.Struct, frozen=True):
 
     object: str
     l2_mm3: float
+    """Overlap of the object OBJECT with the gripper inflated by D_σ and moved by δ along L2 (eq. 11-12)"""
     r2_mm3: float
+    """Overlap of the object OBJECT with the gripper inflated by D_σ and moved by δ along R2 (eq. 11-12)"""
 
 
 class Overlaps(ViewStamps, frozen=True):
@@ -94,14 +110,15 @@ def by_name(value: Any) -> Any:
 @cache
 def _named(kind: type[msgspec.Struct], before: type[msgspec.Struct] | None = None) -> type[msgspec.Struct]:
     """Return the type of what `by_name` makes of a `kind`, with the fields of `before` in front."""
+    parts = [part for part in (before, kind) if part is not None]
     fields = [
         (one.name, _named_hint(one.type), msgspec.field(name=one.encode_name, **_default(one)))
-        for part in (before, kind)
-        if part is not None
+        for part in parts
         for one in msgspec.structs.fields(part)
         if one.name != "header"
     ]
-    return msgspec.defstruct(kind.__name__, fields, namespace={"__doc__": kind.__doc__}, kw_only=True)
+    kept = {name: text for part in parts for name, text in meanings(part).items()}
+    return msgspec.defstruct(kind.__name__, fields, namespace={"__doc__": kind.__doc__, KEPT: kept}, kw_only=True)
 
 
 def _named_hint(hint: Any) -> Any:
@@ -134,10 +151,27 @@ def json_schema(topic: str, kind: type[msgspec.Struct]) -> dict[str, Any]:
     """Return the JSON schema of `kind`, in the form that most tools read.
 
     Definitions stand where they are used, each schema has a `type`, a value that may be null has two, and a tuple of
-    equal items has `items`. So do the schemas that Foxglove's SDK derives from types.
+    equal items has `items`. So do the schemas that Foxglove's SDK derives from types. A value has the meaning of its
+    field as `description`.
     """
     (schema,), components = msgspec.json.schema_components((kind,), ref_template="{name}")
-    return _plain(schema, components) | {"title": f"feelahead.{topic.title().replace('/', '')}"}
+    plain = _described(_plain(schema, components), inspect.type_info(kind))
+    return plain | {"title": f"feelahead.{topic.title().replace('/', '')}"}
+
+
+def _described(schema: dict[str, Any], kind: inspect.Type) -> dict[str, Any]:
+    """Return the schema of `kind` with the meanings of its fields, and of the fields of these."""
+    if isinstance(kind, inspect.UnionType):
+        return _described(schema, kind.types[0])
+    if not isinstance(kind, inspect.StructType) or "properties" not in schema:
+        return schema
+    of = meanings(kind.cls)
+    fields = {
+        one.encode_name: _described(schema["properties"][one.encode_name], one.type)
+        | ({"description": of[one.name]} if one.name in of else {})
+        for one in kind.fields
+    }
+    return schema | {"properties": schema["properties"] | fields}
 
 
 def _plain(schema: dict[str, Any], components: Mapping[str, Any]) -> dict[str, Any]:

@@ -22,6 +22,7 @@ class SideStatus(msgspec.Struct, frozen=True, kw_only=True, rename=_KEYS):
     """Fields that the status of either side has."""
 
     link: LinkState = LinkState.WAITING
+    """State of the link: waiting, up, observing, refused or lost"""
     state: MotionState | None = None
     """State of the arm"""
     stopped_because: str | None = None

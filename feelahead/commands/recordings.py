@@ -49,7 +49,7 @@ class ExportSettings(Limited):
     """Turn a recording into files that other programs read.
 
     csv, parquet: a folder with a file for each topic at its original rate, and a file `joined` with all topics at
-    100 Hz.
+    100 Hz. columns.md beside them says unit, frame and meaning of each column.
     lerobot: a LeRobot dataset, v3.0, at the pictures' own rate, or --fps, cut into the marked episodes. Where the
     package lerobot is installed, it writes the dataset, with pictures as video.
     """
@@ -62,6 +62,8 @@ class ExportSettings(Limited):
     """Frames a second, for lerobot only; by default the median rate of the pictures, at most 30."""
     out: Path | None = None
     """Folder for the files, new or empty; unless given, a folder beside the recording, named after the recording."""
+    columns: bool = False
+    """Only print unit, frame and meaning of every column that csv and parquet can have; needs no recording."""
 
 
 @dataclass(frozen=True)
@@ -154,6 +156,11 @@ def export(arguments: Sequence[str]) -> int:
     settings = parse_settings(ExportSettings, "feelahead export", arguments)
     if settings.fps is not None and settings.format != "lerobot":
         raise ConfigurationError(f"--fps {settings.fps}: valid with: --format lerobot")
+    if settings.columns:
+        from feelahead.recordings.dictionary import dictionary, every_table  # noqa: PLC0415
+
+        sys.stdout.write(dictionary(every_table()))
+        return 0
     with _recording(settings.file) as recording:
         if settings.format != "csv":
             require_packages(f"--format {settings.format}", "pyarrow", extra="experiments")

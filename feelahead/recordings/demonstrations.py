@@ -48,6 +48,8 @@ class Vector(NamedTuple):
     """Names of the k parts"""
     values: Any
     """(n, k) float32"""
+    columns: tuple[str, ...] = ()
+    """Columns of the joined table from which the parts come; empty if they come from elsewhere"""
 
 
 class Episode(NamedTuple):
@@ -105,7 +107,7 @@ def read_demonstrations(recording: Recording, tables: Tables, rate_hz: int | Non
     for name, columns in parts.items():
         values = np.stack([joined.numbers(column) for column in columns.values()], axis=1).astype(np.float32)
         # A value with gaps, such as a field, keeps the last one: the format has no gaps.
-        vectors[name] = Vector(tuple(columns), _held(values)[rows])
+        vectors[name] = Vector(tuple(columns), _held(values)[rows], tuple(columns.values()))
     shown = {view: _newest(found, times_s) for view, found in seen.items()}
     if shown:
         ages_s = [times_s - [picture.captured_s for picture in pictures] for pictures in shown.values()]
@@ -199,6 +201,8 @@ def _vectors(joined: Joined) -> dict[str, dict[str, str]]:
             for kind in ("fast", "slow")
             for strength in range(_STRENGTHS)
         }
+    if "controller.r2_meets" in joined.columns():
+        vectors["observation.meets"] = {f"{side}_meets": f"controller.{side}_meets" for side in ("l2", "r2")}
     if "felt.r2.0" in joined.columns():
         vectors["observation.felt"] = {
             f"{side}_zone_{zone}": f"felt.{side}.{zone}" for side in ("l2", "r2") for zone in range(_ZONES)

@@ -20,6 +20,7 @@ from common.arrays import FloatArray
 from common.errors import ConfigurationError, FeelaheadError
 from common.recording.reading import Recording
 from feelahead.recordings.demonstrations import Demonstrations, Episode, Picture
+from feelahead.recordings.dictionary import FILE, JOINED, Column, column_of, table_of
 from feelahead.recordings.jpeg import decoded, size_of
 
 _VERSION: Final = "v3.0"
@@ -30,6 +31,7 @@ _SAMPLED_PICTURES: Final = 20
 _SAMPLED_PIXELS: Final = 640
 """Maximum number of pixels of each row and column from which they are computed."""
 _ENLARGED_QUALITY: Final = 90
+_AGE: Final = "Time since the capture of this camera's picture in the frame"
 
 
 def export_lerobot(recording: Recording, frames: Demonstrations, folder: Path) -> str:
@@ -47,10 +49,23 @@ def export_lerobot(recording: Recording, frames: Demonstrations, folder: Path) -
                 raise
             except (ArithmeticError, LookupError, RuntimeError, TypeError, ValueError) as error:
                 raise FeelaheadError(f"{writer} cannot write {folder}: {error}") from error
+            _write_dictionary(frames, folder)
             return f"written by {writer}, pictures as video"
         why = f"lerobot writes {library.CODEBASE_VERSION}"
     _write(recording, frames, folder)
+    _write_dictionary(frames, folder)
     return f"written by feelahead, pictures as JPEG ({why})"
+
+
+def _write_dictionary(frames: Demonstrations, folder: Path) -> None:
+    """Write the meaning of each part of each feature into `meta`; LeRobot's own columns are in its documentation."""
+    lines = ["# Features", ""]
+    for name, vector in frames.vectors.items():
+        of = (column_of(JOINED, column) for column in vector.columns)
+        parts = [one._replace(name=part, of=1) for part, one in zip(vector.names, of, strict=False)]
+        parts = parts or [Column(part, "s", "", _AGE) for part in vector.names]
+        lines += [f"## {name}", "", table_of(parts), ""]
+    (folder / "meta" / FILE).write_text("\n".join(lines), encoding="utf-8")
 
 
 def _write_by(library: Any, recording: Recording, frames: Demonstrations, folder: Path) -> None:

@@ -5,7 +5,7 @@ and one clock, so that it can be plotted at once. Each of its rows has the newes
 """
 
 import csv
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
@@ -18,13 +18,14 @@ from common.errors import ConfigurationError, RemoteProtocolError
 from common.recording.entries import Entry, Kind, unpack_block
 from common.recording.reading import Recording
 from feelahead.recordings.controller import read_value
-from operator_side.controller.feel import Feel
+from feelahead.recordings.dictionary import FILE, JOINED, PACKED, TIME, dictionary, parents_of
+from feelahead.recordings.rows import ArmRow, ControllerRow, FeltRow
+from operator_side.controller.feel import FREE_TRIGGER, Feel, Strengths, met
 from operator_side.controller.state import ControllerState
 from robot_side.recording.arm_states import unpack_state
 
 JOINED_HZ: Final = 100.0
 _NANOSECONDS: Final = 1e-9
-_NO_ZONES: Final = (0.0,) * 10
 _MOST_COLUMNS: Final = 5000
 _ROWS_OF_NOTHING: Final = 100_000
 _ROWS_A_MESSAGE: Final = 100
@@ -144,72 +145,74 @@ def read_tables(recording: Recording) -> Tables:
     """Read all tables of a recording; pictures and scenes are left out."""
     tables: dict[str, Table] = {}
     first_ns = last_ns = recording.began_ns
-    zones: dict[str, tuple[float, ...]] = {"l2": _NO_ZONES, "r2": _NO_ZONES}
+    zones: dict[str, Strengths] = {"l2": FREE_TRIGGER, "r2": FREE_TRIGGER}
     recording.require(_TOPICS)
     for message in recording.messages(_TOPICS):
         last_ns = max(last_ns, message.log_ns)
         time_s = _NANOSECONDS * (message.log_ns - first_ns)
         if not message.topic.endswith("/inputs"):
             name = message.topic[1:].replace("/", "_")
-            row = dict(_flat(msgspec.json.decode(message.content)))
+            row = dict(_flat(msgspec.json.decode(message.content), parents_of(name)))
             tables.setdefault(name, Table()).add(time_s, row)
             continue
         block = unpack_block(message.content)
         for entry in block.unpacked():
             # A block has the time stamp of its first entry.
             if (found := _row(entry, zones)) is not None:
-                tables.setdefault(found[0], Table()).add(time_s + entry.now_s - block.first_s, found[1])
+                name, values = found
+                row = dict(_flat(msgspec.to_builtins(values), parents_of(name)))
+                tables.setdefault(name, Table()).add(time_s + entry.now_s - block.first_s, row)
     sorted_tables = {name: table.sorted() for name, table in sorted(tables.items())}
     duration_s = _NANOSECONDS * (last_ns - first_ns)
     return Tables(_NANOSECONDS * first_ns, duration_s, sorted_tables)
 
 
-def _row(entry: Entry, zones: dict[str, tuple[float, ...]]) -> tuple[str, dict[str, Any]] | None:
-    """Return the name of the table and the row for one recorded input.
+def _row(entry: Entry, zones: dict[str, Strengths]) -> tuple[str, msgspec.Struct] | None:
+    """Return the name of the table and the row for one recorded input; keep the zones last written in `zones`.
 
     None for an input that is invalid, or that other topics contain.
     """
     try:
         if entry.kind == Kind.STATE:
             state = unpack_state(entry.content)
-            joints = enumerate(zip(state.joint_positions_rad, state.joint_velocities_rad_s, strict=True))
-            row: dict[str, Any] = {}
-            for index, (position, velocity) in joints:
-                row |= {f"position_rad.{index}": float(position), f"velocity_rad_s.{index}": float(velocity)}
-            row |= {"gripper_opening_m": state.gripper_opening_m, "gripper_holding": state.gripper_holding}
-            return "arm", row
+            positions, velocities = (
+                tuple(state.joint_positions_rad.tolist()),
+                tuple(state.joint_velocities_rad_s.tolist()),
+            )
+            return "arm", ArmRow(positions, velocities, state.gripper_opening_m, state.gripper_holding)
         if entry.kind == Kind.HANDS:
             hands = read_value(entry.content, ControllerState)
-            return "controller", {"l2_raw": hands.l2, "r2_raw": hands.r2}
+            meets = met(zones["l2"], hands.l2), met(zones["r2"], hands.r2)
+            return "controller", ControllerRow(hands.l2, hands.r2, *meets)
         if entry.kind == Kind.TOLD:
             feel = read_value(entry.content, Feel)
             zones.update((name, strengths) for name, strengths in (("l2", feel.l2), ("r2", feel.r2)) if strengths)
-            return "felt", {f"{name}.{zone}": value for name in zones for zone, value in enumerate(zones[name])}
+            return "felt", msgspec.convert(zones, FeltRow)
     except (RemoteProtocolError, ValueError):
         return None
     return None
 
 
-def _flat(values: Any, name: str = "") -> Iterator[tuple[str, Any]]:
+def _flat(values: Any, parents: Collection[str], name: str = "") -> Iterator[tuple[str, Any]]:
     """Yield nested values with flat names: `{"l2": {"fast_m": [1, 2]}}` as `l2.fast_m.0` and `l2.fast_m.1`.
 
-    Overlaps have the names of their objects in front.
+    Overlaps have the names of their objects in front. parents: names that have others below them. Such a value may be
+    absent as a whole, which makes no column. Nor do packed parts of messages.
     """
+    if name.rpartition(".")[2] in PACKED or (values is None and name in parents):
+        return
     if isinstance(values, dict):
         if "object" in values:
             thing = values["object"]
             yield from ((f"{thing}.{key}", value) for key, value in values.items() if key != "object")
             return
         for key, value in values.items():
-            yield from _flat(value, f"{name}.{key}" if name else key)
-    elif isinstance(values, list):
+            yield from _flat(value, parents, f"{name}.{key}" if name else key)
+    elif isinstance(values, list | tuple):
         for index, value in enumerate(values):
-            yield from _flat(value, f"{name}.{index}")
+            yield from _flat(value, parents, f"{name}.{index}")
     else:
         yield name, values
-
-
-JOINED: Final = "joined"
 
 
 def export_csv(tables: Tables, folder: Path) -> list[str]:
@@ -219,12 +222,12 @@ def export_csv(tables: Tables, folder: Path) -> list[str]:
         columns = table.columns()
         with (folder / f"{name}.csv").open("w", newline="", encoding="utf-8") as file:
             writer = csv.writer(file)
-            writer.writerow(["recording_s", *columns])
+            writer.writerow([TIME, *columns])
             for time_s, *values in zip(table.times_s, *map(table.values, columns), strict=True):
                 numbers = (int(value) if isinstance(value, bool) else value for value in values)
                 writer.writerow([f"{time_s:.9f}", *numbers])
         written.append(f"{name}.csv")
-    return written
+    return [*written, _write_dictionary(tables, folder)]
 
 
 def export_parquet(tables: Tables, folder: Path) -> list[str]:
@@ -234,11 +237,17 @@ def export_parquet(tables: Tables, folder: Path) -> list[str]:
 
     written = []
     for name, table in _all(tables):
-        columns: dict[str, Any] = {"recording_s": table.times_s}
+        columns: dict[str, Any] = {TIME: table.times_s}
         columns |= {column: pyarrow.array(_one_kind(list(table.values(column)))) for column in table.columns()}
         parquet.write_table(pyarrow.table(columns), folder / f"{name}.parquet", compression="zstd")
         written.append(f"{name}.parquet")
-    return written
+    return [*written, _write_dictionary(tables, folder)]
+
+
+def _write_dictionary(tables: Tables, folder: Path) -> str:
+    columns = ((name, table.columns()) for name, table in _all(tables))
+    (folder / FILE).write_text(dictionary(columns), encoding="utf-8")
+    return FILE
 
 
 def _all(tables: Tables) -> list[tuple[str, Table | Joined]]:

@@ -45,8 +45,11 @@ class DelayFacts(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     asked: str
     """Delay profile that this side emulates, in netem's words; empty if it emulates none"""
     mean_ms: float | None
+    """Mean one-way delay of the last second; None while unknown"""
     p99_ms: float | None
+    """99th percentile of the one-way delays of the last second; None while unknown"""
     newest_ms: float | None
+    """One-way delay of the newest message; None while unknown"""
 
 
 class HandsFacts(msgspec.Struct, frozen=True):
@@ -83,10 +86,13 @@ class SceneFacts(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Overlap, and the robot side's tick times."""
 
     overlap_mm3: float
-    """Overlap with all objects along the trigger for which the sum is larger"""
+    """Overlap with all objects along the trigger for which the sum is larger (eq. 11-12)"""
     tick_us: float
+    """Median duration of the robot side's recent ticks"""
     tick_p99_us: float
+    """99th percentile of the durations of the robot side's recent ticks"""
     overruns: int
+    """Number of missed deadlines of the robot side's turns, since the start"""
 
 
 class OperatorFacts(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -109,6 +115,7 @@ class OperatorFacts(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     to_robot: DelayFacts
     """Estimate: the round trip less the delay to the operator; half the round trip if that delay is unknown"""
     round_trip_ms: float | None
+    """Newest round trip, without the time for which the robot side held the message; None while unknown"""
     field_age_ms: float | None
     """Time since the newest stiffness message arrived; None before the first"""
     hands: InputSource

@@ -42,4 +42,5 @@ def test_a_field_that_a_message_gets_is_in_the_schema(topic: str, kind: type[msg
     declared = [one.name for one in msgspec.structs.fields(kind) if one.name != "header"]
     described = json_schema(topic, TYPES[topic])
     assert [*described["properties"]][-len(declared) :] == declared
+    assert all(described["properties"][name]["description"] for name in declared if name not in ("l2", "r2", "token"))
     assert described["title"] == f"feelahead.{topic[1:].title()}"

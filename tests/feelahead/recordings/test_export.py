@@ -26,10 +26,12 @@ from common.recording.reading import Recording, open_recording
 from common.recording.wire import HEADER, STATUS, VIEW, as_json, stamped
 from feelahead.commands.recordings import export, plot
 from feelahead.recordings.demonstrations import Picture, read_demonstrations, read_pictures
+from feelahead.recordings.dictionary import column_of
 from feelahead.recordings.lerobot import _of_one_size
 from feelahead.recordings.playback import Seen, seen
 from feelahead.recordings.replay_robot import replay_robot
 from feelahead.recordings.tables import read_tables
+from operator_side.controller.feel import SENSED_TRAVEL
 from tests.feelahead.recordings.conftest import record_pictures
 from tests.helpers.recordings.forms import FORMS, rewritten
 
@@ -65,6 +67,29 @@ def test_csv_has_a_file_for_each_topic_and_one_joined(run: Recording, tmp_path: 
     np.testing.assert_allclose(np.diff(times), 0.01, atol=1e-9)
     assert joined[-1]["stiffness.state"] == "armed"
     assert joined[0]["command.r2"] == ""  # Nothing was sent yet.
+
+
+def test_every_exported_column_is_in_the_dictionary_beside_it(run: Recording, tmp_path: Path) -> None:
+    folder = exported(run, "csv", tmp_path / "csv")
+    beside = (folder / "columns.md").read_text(encoding="utf-8")
+    for path in folder.glob("*.csv"):
+        header = path.read_text(encoding="utf-8").splitlines()[0].split(",")
+        assert not [name for name in header if column_of(path.stem, name).unit == "?"]
+        assert not [name for name in header if any(other.startswith(f"{name}.") for other in header)]
+        assert f"## {path.stem}\n" in beside
+    assert "| `r2.fast_m.0` to `r2.fast_m.7` | m | the trigger |" in beside
+
+
+def test_what_the_finger_meets_is_the_zone_under_it(run: Recording) -> None:
+    joined = read_tables(run).joined()
+    raw, meets = joined.numbers("controller.r2_raw"), joined.numbers("controller.r2_meets")
+    zones = np.stack([joined.numbers(f"felt.r2.{zone}") for zone in range(10)], axis=1)
+    stiff = np.flatnonzero(np.nan_to_num(meets) > 0)
+    assert len(stiff) > 20
+    under = [zones[row][int(10 * SENSED_TRAVEL * raw[row])] for row in stiff]
+    # A row of `joined` may have zones that were written just after the finger was read.
+    assert np.mean(meets[stiff] == under) > 0.9
+    assert (joined.numbers("stiffness.r2.course_stiffness")[stiff] == 0.0).any()
 
 
 def test_a_joined_row_never_knows_what_comes_later(run: Recording) -> None:
