@@ -12,6 +12,7 @@ from common.protocol.around import Around
 from common.protocol.uniform_field import uniform_field
 from common.roles import Role
 from feelahead.both_sides.loopback import Loopback, LoopbackSettings, robot_parts
+from feelahead.both_sides.not_placed import why_not_placed
 from operator_side.controller.feel import MAX_STRENGTH
 from operator_side.dualsense.simulated.trigger_model import zone_of
 from operator_side.people.person import SimulatedOperator
@@ -175,6 +176,7 @@ def run_trial(trial: Trial, seed: int, sample: Callable[[Watch], None] = lambda 
     hits: contacts of the gripper with anything but the target, and of the held object with obstacles.
     full_share: share of the time with R2 pulled in which the finger meets full strength.
     finished_s: time from arming until the object is placed and the gripper has drawn back; None if time ran out.
+    why_not_placed: where the run ended and what kept the arm still, in words; None if the target was placed.
     felt_before_s: time for which rumble or a stiff trigger was felt, without a break, before the held object touched
     the surface on which it was set down.
     """
@@ -194,15 +196,17 @@ def run_trial(trial: Trial, seed: int, sample: Callable[[Watch], None] = lambda 
     loopback.run_until(loopback.clock.now() + _SETTLES_S)
     task = loopback.summary()["task"]
     placing = watch.placing.summary(armed_s)
+    grasped = task["time_to_grasp_s"] is not None
     finished = placing["placed"] and done_s is not None and armed_s is not None
     return {
         "hits": watch.hits,
         "hit_first": watch.hit_first,
         "fastest_hit_mm_s": None if watch.fastest_m_s is None else 1e3 * watch.fastest_m_s,
         "full_share": watch.full_s / watch.pulled_s if watch.pulled_s else None,
-        "grasped": task["time_to_grasp_s"] is not None,
+        "grasped": grasped,
         "lifted_mm": task["lifted_mm"],
         "placed": placing["placed"],
+        "why_not_placed": why_not_placed(loopback, person, placing, armed=armed_s is not None, grasped=grasped),
         "finished_s": (done_s or 0.0) - (armed_s or 0.0) if finished else None,
         "placing_speed_mm_s": placing["contact_speed_mm_s"],
         **{name: placing[name] for name in ("felt_before_s", "felt_before_mm", "tilt_deg")},

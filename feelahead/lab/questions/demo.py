@@ -96,7 +96,10 @@ def run(cell: Trial, seed: int) -> Iterator[Row]:
 
 
 def show(settings: DemoSettings, table: Table) -> Iterator[Shown | str]:
-    """Yield a table for each link: a row for each seed, and the number of successes; then what the start says."""
+    """Yield a table for each link, a row for each seed, and the number of successes; below it why runs failed.
+
+    Last comes what the start says of the model.
+    """
     for (link,), runs in table.groups("link"):
         lines = [[_said(one[name], digits) for name, (_, digits) in COLUMNS.items()] for one in runs]
         total = {name: str(sum(runs.values(name))) for name in ("grasped", "placed", "hits")} | {
@@ -107,6 +110,7 @@ def show(settings: DemoSettings, table: Table) -> Iterator[Shown | str]:
         }
         lines.append([total.get(name, "") for name in COLUMNS])
         yield shown(f"link: {link or 'none'}", (heading for heading, _ in COLUMNS.values()), lines)
+        yield from (f"seed {one['seed']}: not placed: {one['why_not_placed']}" for one in runs if not one["placed"])
     if settings.model is not None and not all(table.values("placed")):
         yield from (f"at the start: {line}" for line in _findings(settings))
 
