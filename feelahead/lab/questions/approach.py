@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
 from statistics import median
-from typing import Annotated, Any, Final, Literal
+from typing import Annotated, Final, Literal
 
 import tyro
 from msgspec import Meta
@@ -25,9 +25,9 @@ from common.protocol.messages import Compensation, Vector2
 from feelahead.lab.approaches.approach import Approach, compile_kernels, run_approach
 from feelahead.lab.approaches.frozen import AHEAD, ASIDE, GRIPPED, SCENES, SITE, frozen_hash, frozen_scene, scene_names
 from feelahead.lab.approaches.laws import TriedLaw, compensation_of, in_words, with_compensation, without_compensation
-from feelahead.lab.approaches.links import mean_loop_s, require_young_loop
+from feelahead.lab.approaches.links import require_young_loop
 from feelahead.lab.approaches.outcome import Outcome
-from feelahead.lab.figures import LAW_COLOURS, figure
+from feelahead.lab.approaches.pictures import draw_comparison, draw_run, law_of_row
 from feelahead.lab.sweep import Question, Sweep
 from feelahead.lab.table import Row, Table
 from feelahead.printing.figures import shown
@@ -37,9 +37,6 @@ from robot_side.settings import Assist
 _QUICK: Final = ("wall", "edge")
 _FARTHEST_MM: Final = 1000.0
 """Distance up to which gaps are measured, in mm."""
-_APART_MS: Final = 6.0
-"""Offset between the laws' points in the figure, so that no line hides another, in ms."""
-_MARKS: Final = ("o", "s", "^", "D", "v", "P", "X")
 _Force = Annotated[float, Meta(ge=0.0, le=20.0)]
 
 
@@ -180,7 +177,7 @@ def show(_: ApproachSettings, table: Table) -> Iterator[RenderableType]:
 
 def sentence(row: Row) -> str:
     """Describe in a line or two how one run ended."""
-    what = f"{row['force_n']:g} N in {Path(row['model']).stem}, law {in_words(_law(row))}: "
+    what = f"{row['force_n']:g} N in {Path(row['model']).stem}, law {in_words(law_of_row(row))}: "
     if row["why"] is not None:
         return f"{what}{row['end']}: {row['why']}"
     if row["contact_speed_mm_s"] is not None:
@@ -197,12 +194,12 @@ def sentence(row: Row) -> str:
 
 def comparison(table: Table) -> Shown:
     """Return a table with a row for each scene, link and force, and a column for each law, over all seeds."""
-    laws = list(dict.fromkeys(_law(row) for row in table))
+    laws = list(dict.fromkeys(law_of_row(row) for row in table))
     names = scene_names(map(Path, table.values("model")))
     entries = [
         (
             *(names[Path(model)], link or "none", f"{force_n:g}", f"{strongest_n:g}"),
-            *(_ends([row for row in rows if _law(row) == law]) for law in laws),
+            *(_ends([row for row in rows if law_of_row(row) == law]) for law in laws),
         )
         for (model, link, force_n, strongest_n), rows in table.groups("model", "link", "force_n", "strongest_n")
     ]
@@ -212,67 +209,7 @@ def comparison(table: Table) -> Shown:
 
 def draw(settings: ApproachSettings, table: Table, path: Path) -> None:
     """Draw zones, travel, speed and gap over time for a single run, or contact speed against delay for several."""
-    (_draw_run if len(table) == 1 else _draw_comparison)(table, frozen_hash(settings.models()), path)
-
-
-def _draw_run(table: Table, frozen: str, path: Path) -> None:
-    row = table.rows[0]
-    trace = row["trace"]
-    end_s = max(trace["time_s"][-1], 0.01) if trace["time_s"] else 0.01
-    link = row["link"] or "no delay"
-    title = f"{row['force_n']:g} N in {Path(row['model']).stem}, law {in_words(_law(row))}, {link} (frozen {frozen})"
-    with figure(path, 2, 1, title, figsize=(8.0, 5.6), sharex=True) as (drawn, (zones, motion)):
-        shades: dict[str, Any] = {"cmap": "Greys", "vmin": 0, "vmax": 8, "interpolation": "nearest"}
-        strengths = list(zip(*trace["strengths"], strict=True)) or [(0,)]
-        shown = zones.imshow(strengths, aspect="auto", origin="lower", extent=(0.0, end_s, 0.0, 1.0), **shades)
-        zones.plot(trace["time_s"], trace["travel"], color="#d55e00", label="the finger")
-        zones.set(ylabel="travel of R2", ylim=(0.0, 1.0))
-        zones.legend(loc="upper left")
-        drawn.colorbar(shown, ax=zones, label="strength, 0 to 8")
-        speeds_mm_s, gaps_mm = ([1e3 * value for value in trace[name]] for name in ("speed_m_s", "gap_m"))
-        motion.plot(trace["time_s"], speeds_mm_s, color="#0072b2", label="speed, mm/s")
-        motion.plot(trace["time_s"], gaps_mm, color="#009e73", linestyle="--", label="true gap, mm")
-        motion.axhline(0.0, color="black", linewidth=0.6)
-        if row["contact_speed_mm_s"] is not None:
-            motion.plot(row["ended_s"], row["contact_speed_mm_s"], "x", color="black", label="contact")
-        motion.set(xlabel="seconds since the pull began", xlim=(0.0, end_s))
-        motion.legend()
-
-
-def _draw_comparison(table: Table, frozen: str, path: Path) -> None:
-    """Draw a panel for each force, with a line for each law and scene.
-
-    A run that stops before the contact counts as 0 mm/s; other runs without a contact are left out.
-    """
-    forces = sorted(set(table.values("force_n")))
-    names = scene_names(map(Path, table.values("model")))
-    laws = list(dict.fromkeys(_law(row) for row in table))
-    options: dict[str, Any] = {"figsize": (4.2 * len(forces) + 1.6, 4.2), "sharey": True, "squeeze": False}
-    with figure(path, 1, len(forces), f"frozen {frozen}", **options) as (drawn, panels):
-        for panel, force_n in zip(panels[0], forces, strict=True):
-            for (place, law), (number, scene) in product(enumerate(laws), enumerate(names)):
-                points: dict[float, list[float]] = {}
-                for row in table.where(force_n=force_n, model=str(scene)):
-                    if row["end"] in ("contact", "stopped") and _law(row) == law:
-                        points.setdefault(500.0 * mean_loop_s(row["link"], row["link_model"]), []).append(
-                            row["contact_speed_mm_s"] or 0.0
-                        )
-                panel.plot(
-                    [delay + _APART_MS * place for delay in sorted(points)],
-                    [median(points[delay]) for delay in sorted(points)],
-                    marker=_MARKS[number % len(_MARKS)],
-                    color=LAW_COLOURS[law],
-                    alpha=0.7,
-                    label=f"{in_words(law)}, {names[scene]}" if force_n == forces[0] else None,
-                )
-            panel.set(title=f"{force_n:g} N", xlabel="delay each way, ms (beside each other: the laws)")
-            panel.grid(alpha=0.3)
-        panels[0][0].set(ylim=(-5.0, None), ylabel="speed at contact, mm/s (0: no contact)")
-        drawn.legend(loc="outside right upper", fontsize=7)
-
-
-def _law(row: Row) -> TriedLaw:
-    return with_compensation(row["law"], row["compensation"])
+    (draw_run if len(table) == 1 else draw_comparison)(table, frozen_hash(settings.models()), path)
 
 
 def _gap(gap_mm: float) -> str:

@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -172,6 +173,16 @@ def test_several_runs_are_a_table_a_list_and_a_figure(
     drawn = picture.read_text()
     assert all(LAW_COLOURS[law] in drawn for law in SEVERAL)
     assert len({LAW_COLOURS[law] for law in LAWS}) == len(LAWS)
+    assert "delay each way, ms" in drawn
+
+
+def test_with_one_delay_the_axis_has_the_laws_and_no_delay_that_none_had(runs: MadeUp, tmp_path: Path) -> None:
+    picture = tmp_path / "picture.svg"
+    laws = ("--law", "swept", "paper", "--link", "delay 200ms")
+    assert tried("--model", WALL, "--force", "3", *laws, "--picture", str(picture)) == 0
+    texts = set(re.findall(r"<!-- (.*?) -->", picture.read_text()))
+    assert {"swept", "paper", "law, at 200 ms each way"} < texts
+    assert runs.asked
 
 
 @pytest.mark.parametrize("end", ["undecided", "failed", "disarmed"])
