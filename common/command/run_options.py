@@ -37,10 +37,10 @@ class RunOptions:
     """TOML file with settings, which flags override; every flag's name is a key of the file."""
     link: Annotated[str, tyro.conf.arg(metavar="SPEC")] = ""
     """Emulated link for this side's messages, in netem's words, such as "delay 50ms 10ms distribution normal loss 1%".
-    Further words are duplicate, corrupt, reorder, rate and limit, and also "trace FILE.csv" and "outage 2s at 10s every
-    30s" (counted from the first message). Each direction and stream may have its own link: "to_robot: delay 20ms;
-    to_operator: delay 50ms 10ms; video: rate 2mbit; to_operator.telemetry: loss 5%". A name is valid, too: lan, wifi,
-    lte, low-orbit, intercontinental, satellite."""
+    Further words are duplicate, corrupt, reorder, rate and limit, and also "trace FILE.csv" (a column delay_ns, or
+    sent_ns and received_ns, in nanoseconds) and "outage 2s at 10s every 30s" (counted from the first message). Each
+    direction and stream may have its own link: "to_robot: delay 20ms; to_operator: delay 50ms 10ms; video: rate 2mbit;
+    to_operator.telemetry: loss 5%". A name is valid, too: lan, wifi, lte, low-orbit, intercontinental, satellite."""
     link_model: LinkModel = "datagram"
     """How the emulated link treats messages. datagram: they are lost and reordered as with UDP. stream: they keep their
     order as with TCP, so that a loss becomes a delay."""

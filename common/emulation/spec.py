@@ -75,9 +75,15 @@ class LinkSpec:
         return dataclasses.replace(there, seed=seed, round_trip_s=round_trip_s)
 
     def unused(self, carried: Iterable[tuple[Direction, Stream]]) -> list[str]:
-        """Return the names of clauses that apply to none of `carried`, the (direction, stream) pairs that are sent."""
-        used = {self._clause_name(direction, stream) for direction, stream in carried}
-        return [name for name in self.clauses if name not in used]
+        """Return the names of clauses that apply to none of `carried`, the (direction, stream) pairs that are sent.
+
+        Where another clause applies, those for the other direction are none of them: both sides may be given the same
+        specification, and a link's name, such as `lte`, has a clause for each direction.
+        """
+        pairs = list(carried)
+        used = {self._clause_name(direction, stream) for direction, stream in pairs} - {None}
+        elsewhere = set(get_args(Direction)) - {direction for direction, _ in pairs} if used else set()
+        return [name for name in self.clauses if name not in used and name.partition(".")[0] not in elsewhere]
 
     def _clause_name(self, direction: Direction, stream: Stream) -> str | None:
         for name in (f"{direction}.{stream}", stream, direction, ""):
@@ -94,8 +100,8 @@ class LinkSpec:
 def unused_clauses(link: LinkSpec, carried: Iterable[tuple[Direction, Stream]]) -> list[str]:
     """Return a line to show for each clause of `link` that applies to none of `carried`, the pairs that are sent."""
     return [
-        f"link: {f'the clause {name!r}' if name else 'the profile without a name'} has no effect, as nothing to which"
-        " it applies is sent here"
+        f"--link: {f'{name!r}' if name else 'the profile without a name'} changes nothing:"
+        f" {'this side sends no such messages' if name else 'each stream that this side sends has its own'}"
         for name in link.unused(carried)
     ]
 

@@ -88,6 +88,8 @@ def _rows(
     return tuple(Transition(state, event, after or state, why) for state in SessionState if state in set(before))
 
 
+_GAP: Final = "no command reached the robot in time"
+_OLD_LOOP: Final = "the link's round trip is too long"
 _ARM_LOST: Final = "arm lost: nothing new is heard of it"
 _ASTRAY: Final = "the arm does not follow"
 _INPUT_HELD: Final = "arming needs triggers, sticks, gripper and home at rest"
@@ -98,21 +100,22 @@ def _build() -> tuple[Transition, ...]:
     strangers = (state.UNKNOWN, state.AWAY)
     known = (state.OBSERVING, *OWNING)
     return (
-        *_rows(strangers, event.ASKED_WHILE_FREE, state.DISARMED, "first come, and always disarmed"),
+        *_rows([state.UNKNOWN], event.ASKED_WHILE_FREE, state.DISARMED, "newly connected, so disarmed"),
+        *_rows([state.AWAY], event.ASKED_WHILE_FREE, state.DISARMED, "connected again after a silence, so disarmed"),
         *_rows(strangers, event.ASKED_WHILE_HELD, state.OBSERVING, "one owner, many observers"),
         *_rows([state.UNKNOWN], event.ASKED_WHILE_FULL, None, "no room for another observer"),
         *_rows([state.AWAY], event.ASKED_WHILE_FULL, None, "no room for another observer"),
-        *_rows([state.OBSERVING], event.LEASE_PASSED, state.DISARMED, "a lease that was passed on begins disarmed"),
+        *_rows([state.OBSERVING], event.LEASE_PASSED, state.DISARMED, "the robot was handed over to you, disarmed"),
         *_rows([state.DISARMED], event.HEALTHY, state.READY, "may be armed"),
         *_rows([state.STOPPED], event.HEALTHY, state.STOPPED_READY, "may be armed again"),
         *_rows([state.READY, state.STOPPED_READY], event.ARM, state.ARMED, "armed on purpose"),
         *_rows([state.DISARMED, state.STOPPED], event.ARM_EARLY, None, NOT_ARMED),
         *_rows([state.READY], event.INPUT_HELD, state.DISARMED, _INPUT_HELD),
         *_rows([state.STOPPED_READY], event.INPUT_HELD, state.STOPPED, _INPUT_HELD),
-        *_rows([state.READY, state.ARMED], event.GAP, state.DISARMED, "no command for longer than the gap limit"),
-        *_rows([state.STOPPED_READY], event.GAP, state.STOPPED, "no command for longer than the gap limit"),
-        *_rows([state.READY, state.ARMED], event.OLD_LOOP, state.DISARMED, "loop age over the limit"),
-        *_rows([state.STOPPED_READY], event.OLD_LOOP, state.STOPPED, "loop age over the limit"),
+        *_rows([state.READY, state.ARMED], event.GAP, state.DISARMED, _GAP),
+        *_rows([state.STOPPED_READY], event.GAP, state.STOPPED, _GAP),
+        *_rows([state.READY, state.ARMED], event.OLD_LOOP, state.DISARMED, _OLD_LOOP),
+        *_rows([state.STOPPED_READY], event.OLD_LOOP, state.STOPPED, _OLD_LOOP),
         *_rows([state.DISARMED], event.ARM_LOST, None, _ARM_LOST),
         *_rows([state.READY, state.ARMED], event.ARM_LOST, state.DISARMED, _ARM_LOST),
         *_rows([state.STOPPED_READY], event.ARM_LOST, state.STOPPED, _ARM_LOST),
@@ -120,9 +123,9 @@ def _build() -> tuple[Transition, ...]:
         *_rows([state.READY, state.ARMED], event.ASTRAY, state.DISARMED, _ASTRAY),
         *_rows([state.STOPPED_READY], event.ASTRAY, state.STOPPED, _ASTRAY),
         *_rows(OWNING, event.EMERGENCY_STOP, state.STOPPED, "emergency stop"),
-        *_rows(known, event.WRONG_TOKEN, None, "counted, never applied"),
+        *_rows(known, event.WRONG_TOKEN, None, "a command of an earlier lease was not applied"),
         *_rows(OWNING, event.HAND_OVER, state.OBSERVING, "the owner handed the lease over"),
-        *_rows(known, event.SILENT, state.AWAY, "nothing heard for longer than the lease limit"),
+        *_rows(known, event.SILENT, state.AWAY, "nothing was heard from this operator for too long"),
         *_rows((*known, state.AWAY), event.NEW_EPOCH, state.ENDED, "the operator side began a new epoch"),
         *_rows([state.AWAY], event.FORGOTTEN, state.ENDED, "too many are remembered"),
     )

@@ -191,8 +191,8 @@ class Safety:
 
     def _check_loop(self, now_s: float) -> None:
         if not self._loop_is_young(now_s):
-            age = "unknown" if self._echoed_s is None else f"{now_s - self._echoed_s:.2f} s"
-            self._handle(SessionEvent.OLD_LOOP, now_s, f"loop age of {age}")
+            age = "an unknown time" if self._echoed_s is None else f"{now_s - self._echoed_s:.2f} s"
+            self._handle(SessionEvent.OLD_LOOP, now_s, f"the link's round trip takes {age}")
 
     def _loop_is_young(self, now_s: float) -> bool:
         # Without an echo the loop age is unknown: conservatively, too old.
@@ -227,7 +227,7 @@ class Safety:
             self._healthy_since_s = None
         if event is SessionEvent.EMERGENCY_STOP:
             self._stopped = True
-        said = why if event in (SessionEvent.ASTRAY, SessionEvent.ARM_EARLY) else None
+        said = None if event is SessionEvent.ARM_LOST else why  # its age, which grows, would be news in each turn
         row = None if self._session is None else self._session.handle(event, said)
         if row is None:
             return

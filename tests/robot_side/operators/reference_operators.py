@@ -71,7 +71,7 @@ class ReferenceOperators:
             self._disarm(now_s, f"no command for {1e3 * (now_s - self.accepted_s):.0f} ms")
             self.command = self.accepted_s = None
         if not self._loop_is_young(now_s):
-            self._disarm(now_s, "loop age of")
+            self._disarm(now_s, "the link's round trip takes")
 
     def hear(self, message: Hello | MotionCommand, peer: bytes, arrival: Arrival, now_s: float) -> None:
         """Receive one message. `arrival` gives its ages; whether it is fresh is computed here."""
@@ -114,7 +114,7 @@ class ReferenceOperators:
         inputs = command.l2, command.r2, *command.lateral, *command.turning
         released = not (command.gripper or command.home) and all(abs(one) <= RELEASED_TRAVEL for one in inputs)
         if not self._loop_is_young(now_s) or not (released or owner.state is State.ARMED):
-            self._disarm(now_s, "loop age of")
+            self._disarm(now_s, "the link's round trip takes")
         elif command.emergency_stop:
             self.quiet_s = None
         elif owner.state is not State.ARMED:
