@@ -1,7 +1,9 @@
-"""Status output: a live line in a terminal, a story in a file, or JSON lines for programs."""
+"""Status output: a story for people, above a live line in a terminal, or JSON lines for programs."""
 
 import json
+import re
 import sys
+import textwrap
 from collections.abc import Callable
 from typing import IO, Any, Literal, cast
 
@@ -21,6 +23,8 @@ StatusMode = Literal["line", "json", "facts", "none"]
 
 _PERIOD_S = 0.2
 _FACTS_PERIOD_S = 0.1
+_TIME_COLUMNS = 10
+"""Width of the time before each line of the story"""
 _LINES_OF_JSON = ("json", "facts")
 
 
@@ -91,13 +95,24 @@ class Status:
             self._write({"event": "status", **joined(robot, operator)})
             return
         view = LiveView(robot, operator)
+        reported = self._story.tell(now_s, view)
         if self._live is not None:
+            if reported is not None:
+                self._console.print(self._paragraph(printable(reported)), style="bold red" if view.alarm else "")
             # The last column stays free: some terminals break the line when it is filled.
             text = printable(live_line(view, self._console.width - 1))
             style = "bold red" if view.alarm else ""
             self._live.update(Text(text, style=style, overflow="crop", no_wrap=True), refresh=True)
-        elif (reported := self._story.tell(now_s, view)) is not None:
+        elif reported is not None:
             self._output.write(f"{printable(reported)}\n")
+
+    def _paragraph(self, text: str) -> Text:
+        """Break a line of the story between words, with its time in a column of its own; a unit stays at its number."""
+        width = max(self._console.width - 1, _TIME_COLUMNS + 1)
+        kept = re.sub(r"(?<=\d) (?=%|mm)", "\0", text)
+        return Text(
+            textwrap.fill(kept, width, subsequent_indent=" " * _TIME_COLUMNS).replace("\0", " "), overflow="fold"
+        )
 
     def show_facts(self, facts: Any) -> None:
         """Write `facts`, a struct of all that the console shows, at once; only in the mode "facts"."""

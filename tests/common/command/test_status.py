@@ -145,6 +145,8 @@ def test_on_a_terminal_one_line_is_kept_up_to_date(
     updates = [tick for tick in range(1000) if f"pull {tick}/–%" in written]
     assert updates == pytest.approx([0, 200, 400, 600, 800], abs=5)
     assert "a line that stays" in written
+    # The story stays above the line, broken between words.
+    assert "   0.0 s  link up; starting" in written
     # Whole facts only: there is no room for the distances.
     assert "starting  L2/R2 pull 0/–% resist –/–%\r" in written
     # The hidden cursor comes back, also after an error.
