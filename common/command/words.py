@@ -4,10 +4,16 @@ from enum import StrEnum
 from typing import Final
 
 from common.protocol.session import SessionState
-from common.status.codes import LinkState, Phase
+from common.status.codes import Doing, LinkState, Phase
 from common.status.phase import PhaseFacts
 from common.status.statuses import OperatorStatus, RobotStatus
 
+_SAID: Final = {
+    Doing.AT_REST_FIRST: "release all but hold-to-run",
+    Doing.ALL_KEYS_UP_FIRST: "release all keys for a second",
+    Doing.READY: "ready: hold-to-run arms",
+    Doing.RUNNING: "driven from a page",
+}
 _LEASE: Final = {
     SessionState.READY: "ready to arm",
     SessionState.STOPPED_READY: "stopped, ready to arm",
@@ -20,6 +26,11 @@ def words(code: StrEnum | str | None) -> str:
     return "" if code is None else str(code).replace("_", " ")
 
 
+def doing_words(doing: Doing) -> str:
+    """Return an action in words."""
+    return _SAID.get(doing, words(doing))
+
+
 def lease_words(state: SessionState | None) -> str:
     """Return an operator's state in words; empty for none."""
     return words(state) if state is None else _LEASE.get(state, words(state))
@@ -27,7 +38,7 @@ def lease_words(state: SessionState | None) -> str:
 
 def phase_words(facts: PhaseFacts, side: RobotStatus | OperatorStatus | None) -> tuple[str, str | None]:
     """Return the phase in words, in capitals for an alarm, and the reason or None. side: the status of the link."""
-    said, reason = words(facts.doing or facts.phase), facts.reason
+    said, reason = doing_words(facts.doing) if facts.doing else words(facts.phase), facts.reason
     if facts.phase in (Phase.WAITING, Phase.OBSERVING):
         said = link_words(side)
     elif facts.phase is Phase.LINK_LOST and reason is None:

@@ -32,10 +32,10 @@ def check_permission(*, is_root: bool, rules: Mapping[str, str], controllers: Se
     if all(seen.verdict is Verdict.OK for seen in controllers if seen.name == _NAME):
         return Finding(name, Verdict.OK, "the controller can be opened")
     if not (missing := missing_grants(rules)):
-        return Finding(name, Verdict.OK, "there, for USB and Bluetooth")
+        return Finding(name, Verdict.OK, "installed, for USB and Bluetooth")
     remedy = installing_command()
     if is_root:
-        return Finding(name, Verdict.OK, "not needed by root, as you are; the command below is for other users", remedy)
+        return Finding(name, Verdict.OK, "not needed, as you are root; the command below is for other users", remedy)
     denied = any("no permission" in seen.said for seen in controllers)
     opened = f"lets you open {', '.join(missing)}; plug the controller in again after it"
     verdict = Verdict.MISSING if denied else Verdict.NOTE

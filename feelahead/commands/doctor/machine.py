@@ -75,9 +75,9 @@ def check_kernels(facts: KernelFacts | None) -> list[Finding]:
         return []
     if not facts.missing:
         return [Finding("kernels", Verdict.OK, f"{facts.kernels} compiled for this processor, in {facts.folder}")]
-    said, remedy = "the first start does, some ten seconds", COMPILE
+    said, remedy = "the first start compiles them, in some ten seconds", COMPILE
     if not facts.writable:
-        said = f"{facts.folder} keeps none: each start compiles, about a minute"
+        said = f"{facts.folder} cannot keep them: each start compiles for about a minute"
         remedy = f"let this user write to {facts.folder}, or set NUMBA_CACHE_DIR to another folder; then: {COMPILE}"
     missing = f"{facts.missing} of {facts.kernels} are not compiled for this processor"
     return [Finding("kernels", Verdict.NOTE, f"{missing}: {said}", remedy)]
@@ -93,17 +93,19 @@ def check_rendering(troubles: Mapping[str, str | None]) -> Finding:
         return Finding("cameras", Verdict.OK, f"rendered without a screen by {working[0].upper() or 'OpenGL'}")
     said = "; ".join(trouble for trouble in troubles.values() if trouble is not None)
     remedy = REMEDY if "egl" in troubles else None
-    return Finding("cameras", Verdict.NOTE, f"no pictures, the arm is driven without: {said}", remedy)
+    return Finding(
+        "cameras", Verdict.NOTE, f"no pictures can be made; the arm can be driven without them: {said}", remedy
+    )
 
 
 def check_realtime(notes: Sequence[str]) -> list[Finding]:
     """Check whether the system would grant `--realtime`; `notes` has a line for each refused part."""
     if sys.platform != "linux":
-        return [Finding("--realtime", Verdict.NOTE, "Linux alone has it; the sides run without")]
+        return [Finding("--realtime", Verdict.NOTE, "only Linux has it; the sides run without it")]
     findings = []
     for note in notes:
         said, _, how = note.removeprefix("--realtime: ").partition("; to permit it: ")
-        findings.append(Finding("--realtime", Verdict.NOTE, f"{said}; the sides run without", how or None))
+        findings.append(Finding("--realtime", Verdict.NOTE, f"{said}; the sides run without it", how or None))
     return findings or [Finding("--realtime", Verdict.OK, "permitted")]
 
 
@@ -138,7 +140,7 @@ def _facts(kernels: Sequence["Compiled"]) -> KernelFacts:
 def rendering_troubles() -> dict[str, str | None]:
     """Try each off-screen backend in a separate process; return why it fails, or None if it works."""
     outputs = {backend: _output_of(_RENDER, backend) for backend in BACKENDS}
-    ended = "trying it ends Python, or takes too long"
+    ended = "the trial crashes, or takes too long"
     return {backend: ended if said is None else json.loads(said) for backend, said in outputs.items()}
 
 

@@ -62,7 +62,7 @@ def permission(*seen: Finding, is_root: bool = False, rules: str = "") -> Findin
         ([permission()], NOTE, RULE_FILE, "udevadm control --reload && sudo udevadm trigger$"),
         ([permission(DENIED)], MISSING, RULE_FILE, "udevadm"),
         ([permission(SEEN)], OK, "can be opened", None),
-        ([permission(rules="\n".join(RULES))], OK, "there", None),
+        ([permission(rules="\n".join(RULES))], OK, "installed", None),
         ([permission(is_root=True)], OK, "root", "udevadm"),
         (check_realtime([]), OK, "permitted", None),
         (check_realtime([NO_RIGHT]), NOTE, "locking memory is not permitted;", "^sudo this; and that$"),
