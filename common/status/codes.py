@@ -77,15 +77,15 @@ class Doing(StrEnum):
     NO_TARGET = "no_target"
     """The person would advance, but there is no target."""
     AT_REST_FIRST = "at_rest_first"
-    """Of a page: all keys but hold-to-run must be released before the arm moves."""
+    """A page drives, and all its keys but hold-to-run must be released before the arm moves."""
     NOBODY_DRIVES = "nobody_drives"
-    """Of a page: no page drives."""
+    """No page drives."""
     ALL_KEYS_UP_FIRST = "all_keys_up_first"
-    """Of a page: driving begins after a second without any input."""
+    """A page is to drive, which begins after a second without any input."""
     READY = "ready"
-    """Of a page: all keys have been released, so pressing hold-to-run now takes effect."""
+    """All keys of the page have been released, so pressing hold-to-run now takes effect."""
     RUNNING = "running"
-    """Of a page: its inputs move the arm."""
+    """The inputs of a page move the arm."""
 
 
 class Phase(StrEnum):
