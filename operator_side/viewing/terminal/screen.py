@@ -20,7 +20,7 @@ SILENT_AFTER_S: Final = 0.5
 """Age of the facts above which an alarm says that there is no news, in seconds"""
 _KEPT: Final = 200
 """Number of facts in a curve (20 s at ten a second), and number of notes kept"""
-_CURVES: Final = (("delay", "ms"), ("meets", "of 8"), ("overlap", "mm³"), ("tick p99", "µs"))
+_CURVES: Final = (("delay", "ms"), ("meets", ""), ("overlap", "mm³"), ("tick p99", "µs"))
 _BLOCKS: Final = " ▁▂▃▄▅▆▇█"
 _ALARM, _ARMED, _QUIET = "bold white on red", "bold black on bright_cyan", "reverse"
 _FAINT, _TITLE, _PULL, _FELT = "bright_black", "bold", "bright_cyan", "bold bright_yellow"
