@@ -66,20 +66,34 @@ class HandsFacts(msgspec.Struct, frozen=True):
     link_asked: str | None
     """Link that this side last asked to emulate, in netem's words; None before the first request"""
     counts: float = 1.0
-    """Share of a page's motion that counts, 0 to 1: less while the pictures are old"""
+    """Share of a page's motion that counts, 0 to 1: less while the pictures are old, or the page is late"""
     reset_first: bool = False
     """Whether a stop must be reset before a page's hands count"""
     yields: tuple[bool, bool] = (False, False)
     """For L2 and R2, whether the pull of the page's keys yields to stiff zones, as a finger of 2 N would"""
+    because: str = ""
+    """Why less than all of a page's motion counts, with what was measured; empty if all counts"""
+
+
+class PictureState(StrEnum):
+    """State of the pictures of one view."""
+
+    FRESH = "fresh"
+    OLD = "old"
+    """Pictures are older than the link explains"""
+    DEAD = "dead"
+    """No new picture comes"""
 
 
 class PictureFacts(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Limits of the pictures' freshness by view, in the order of VIEW_NAMES."""
+    """Freshness of the pictures by view, in the order of VIEW_NAMES."""
 
     old_s: tuple[float | None, ...]
     """Age from which a picture is old; None while unknown"""
     dead_s: tuple[float, ...]
     """Silence from which a view is dead"""
+    states: tuple[PictureState, ...] = ()
+    """States, which pages show; empty in recordings made before there were any"""
 
 
 class SceneFacts(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

@@ -13,13 +13,12 @@ from common.protocol.messages import MotionState
 from common.protocol.view_messages import VIEW_NAMES
 from common.status.codes import InputSource
 from operator_side.viewing.console.console import Console
-from operator_side.viewing.facts import HandsFacts, PictureFacts
+from operator_side.viewing.facts import HandsFacts, PictureFacts, PictureState
 from tests.console.browser import SMALL, Browser, Page
 from tests.helpers.machines.waiting import wait_until
 from tests.operator_side.console_feed import Pictures, facts, shapes, state
 
-OLD_S: Final = 30.0
-"""Limit of age: no machine is as slow as that"""
+FRESH: Final = PictureFacts((0.4,) * 2, (0.5,) * 2, (PictureState.FRESH,) * 2)
 AGE: Final = "document.querySelector('#overview').dataset.age"
 
 
@@ -37,7 +36,7 @@ class Fed:
     """Changes to the status"""
     page: HandsFacts = field(default_factory=lambda: HandsFacts(True, "page", False, "", None, yields=(False, True)))
     """Facts for the page; a page that asks to drive is the driver"""
-    pictures: PictureFacts = field(default_factory=lambda: PictureFacts((OLD_S,) * 2, (OLD_S,) * 2))
+    pictures: PictureFacts = FRESH
     notes: list[str] = field(default_factory=list)
     address: str | None = None
     ends: threading.Event = field(default_factory=threading.Event)

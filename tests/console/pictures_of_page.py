@@ -9,9 +9,9 @@ from msgspec.structs import replace
 from PIL import Image
 
 from common.status.codes import Doing, LinkState
-from operator_side.viewing.facts import PictureFacts
+from operator_side.viewing.facts import PictureState
 from tests.console.browser import LARGE, SMALL, Page, browser
-from tests.console.fed_page import OLD_S, Fed, fed_page
+from tests.console.fed_page import FRESH, fed_page
 from tests.console.run import DRAWN, STATE, Run, running
 from tests.console.test_hands import is_armed, pull, take_over
 
@@ -79,12 +79,12 @@ def make_states(folder: Path, paths: Sequence[Path]) -> None:
             fed.status = {"person": Doing.RUNNING}
             page.wait_for_text("#hands_state", "You drive")
             keep(page)
-            shown, fed.page = fed.page, replace(fed.page, counts=0.0)
-            fed.age_s, fed.pictures = 1.0, PictureFacts((0.4, 0.4), (OLD_S, OLD_S))
+            shown, fed.page = fed.page, replace(fed.page, counts=0.0, because="pictures are 1000 ms old")
+            fed.age_s, fed.pictures = 1.0, replace(FRESH, states=(PictureState.OLD,) * 2)
             keep(page)
-            fed.sends, fed.pictures = False, PictureFacts((0.4, 0.4), (0.5, 0.5))
+            fed.sends, fed.pictures = False, replace(FRESH, states=(PictureState.DEAD,) * 2)
             keep(page)
-        fed.page, fed.age_s, fed.sends, fed.pictures = replace(shown, reset_first=True), 0.0, True, Fed().pictures
+        fed.page, fed.age_s, fed.sends, fed.pictures = replace(shown, reset_first=True), 0.0, True, FRESH
         fed.state, fed.status = "stopped", {"person": Doing.ALL_KEYS_UP_FIRST}
         page.wait(f"{STATE} == 'stopped'", "shown as stopped")
         keep(page)

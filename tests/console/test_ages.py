@@ -3,9 +3,9 @@
 import msgspec
 import pytest
 
-from operator_side.viewing.facts import PictureFacts
+from operator_side.viewing.facts import PictureState
 from tests.console.browser import Browser
-from tests.console.fed_page import AGE, OLD_S, fed_page
+from tests.console.fed_page import AGE, FRESH, fed_page
 from tests.console.hands_alone import hands_alone
 
 pytestmark = [pytest.mark.console, pytest.mark.processes]
@@ -14,14 +14,14 @@ pytestmark = [pytest.mark.console, pytest.mark.processes]
 def test_old_pictures_are_amber_in_a_corner_and_keep_their_colours_and_dead_ones_say_so(browser: Browser) -> None:
     with fed_page(browser) as (fed, page):
         fed.age_s = 2.0
-        fed.pictures = PictureFacts((0.4,) * 2, (OLD_S,) * 2)
+        fed.pictures = msgspec.structs.replace(FRESH, states=(PictureState.OLD,) * 2)
         page.wait(f"{AGE} == 'old'", "amber")
         looks = "getComputedStyle(document.querySelector('#overview {}')).{}"
         assert page.ask(looks.format(".age", "backgroundColor")) == "rgb(255, 193, 77)"
         assert page.ask(looks.format("canvas", "filter + getComputedStyle(document.body).opacity")) == "none1"
         assert not page.raw.is_visible("#overview .dead")
         page.picture("pictures-old")
-        fed.sends, fed.pictures = False, PictureFacts((OLD_S,) * 2, (0.5,) * 2)
+        fed.sends, fed.pictures = False, msgspec.structs.replace(FRESH, states=(PictureState.DEAD,) * 2)
         page.wait_for_text("#overview .dead", "NO NEW PICTURE for 2")
         assert page.ask(AGE) == "dead"
         assert page.raw.is_visible("#overview .dead")
@@ -31,8 +31,8 @@ def test_old_pictures_are_amber_in_a_corner_and_keep_their_colours_and_dead_ones
 def test_the_border_says_that_hands_are_off_until_they_count_again(browser: Browser) -> None:
     with fed_page(browser) as (fed, page):
         for counts, words in ((0.4, "hands at 40 %"), (0.0, "hands off")):
-            fed.page = msgspec.structs.replace(fed.page, counts=counts)
-            page.wait_for_text("#hands_off", words)
+            fed.page = msgspec.structs.replace(fed.page, counts=counts, because="pictures are 640 ms old")
+            page.wait_for_text("#hands_off", f"{words}: pictures are 640 ms old")
             assert page.raw.is_visible("#hands_off")
         page.picture("hands-off")
         fed.page = msgspec.structs.replace(fed.page, counts=1.0)

@@ -7,9 +7,9 @@ from common.protocol.messages import MotionState
 from common.protocol.session import SessionState
 from common.protocol.view_messages import VIEW_NAMES
 from common.status.codes import Doing, InputSource, LinkState
-from operator_side.viewing.facts import ShownKind
+from operator_side.viewing.facts import PictureState, ShownKind
 
-_CODES: Final = (ShownKind, LinkState, SessionState, Doing, InputSource)
+_CODES: Final = (ShownKind, PictureState, LinkState, SessionState, Doing, InputSource)
 
 
 def names() -> str:

@@ -136,7 +136,7 @@ class DrivingPage:
         """Return the facts for the pages. person: whether they may hand the controls back to a scripted person."""
         self._expire(now_s)
         known = (self.may_drive, self.driver, person, core.tuner.why, core.tuner.link)
-        return HandsFacts(*known, self.pictures.hands, self.reset_first, self.yields)
+        return HandsFacts(*known, self.pictures.hands, self.reset_first, self.yields, self.pictures.because)
 
     def _take(self, page: int, hands: PageHands, now_s: float) -> None:
         if hands.stop:  # even an overtaken one

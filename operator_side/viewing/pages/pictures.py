@@ -1,4 +1,4 @@
-"""Age from which a picture is old, silence from which its view is dead, and how far a page's hands count then.
+"""State of the pictures that a page shows, fresh, old or dead, and how far a page's hands count then.
 
 A limit uses nothing of the pictures' own delay: a queue before them must show, and not raise the limit.
 """
@@ -8,14 +8,13 @@ import math
 from collections import deque
 from collections.abc import Iterable
 from itertools import islice
-from statistics import median
 from typing import Final
 
 from common.errors import RemoteProtocolError
 from common.protocol.codec import decode_view
 from common.protocol.view_messages import VIEW_NAMES, VideoFrame, VideoStep, ViewName
 from operator_side.core import OperatorSide
-from operator_side.viewing.facts import PictureFacts
+from operator_side.viewing.facts import PictureFacts, PictureState
 
 _MARGIN_S: Final = 0.1
 _LEAST_SILENCE_S: Final = 0.5
@@ -25,15 +24,22 @@ _LONGEST_INTERVAL_S: Final = 1.0
 _FIRST_INTERVAL_S: Final = 1.0 / 30.0
 _OTHER_CLOCK_S: Final = 1.0
 """A picture earlier than the newest by more is of another clock: the robot side has started anew."""
-_KEPT: Final = 15
-"""Number of pictures by which interval and size are measured"""
 _TAIL: Final = 0.95
+_USUAL: Final = 0.9
+"""Share of the intervals between pictures that are no longer than the one that counts: losses make some long"""
 _WINDOW_S: Final = 10.0
-"""Time over which the control stream's delay is measured, in seconds"""
+"""Time over which the control stream's delay and the pictures' interval are measured, in seconds"""
 _MOST_SAMPLES: Final = 1000
 _PERIOD_S: Final = 0.25
-_PATIENCE_S, _FALL_S, _RISE_S = 0.2, 0.6, 0.5
-"""Old pictures are tolerated for the first, the hands fade in the second, and return in the third, in seconds."""
+_RISES, _FALLS = 0.2, 0.05
+"""Greatest rates at which a limit follows what is measured, in seconds a second"""
+_LOOK_S: Final = 0.2
+_LOOKS: Final = 3
+"""Number of looks in a row, each of `_LOOK_S`, that change a state"""
+_UNSEEN_M: Final = 0.02
+"""Motion, in metres, that old pictures may hide before the hands fade"""
+_FALL_S, _RISE_S = 0.6, 0.5
+"""The hands fade in the first, and return in the second, in seconds."""
 FIRST: Final[ViewName] = VIEW_NAMES[0]
 """View that is shown first: its age decides whether hands count."""
 
@@ -56,29 +62,72 @@ def dead_after_s(interval_s: float) -> float:
 
 
 class _View:
-    """Newest pictures of one view."""
+    """Newest pictures of one view, and its state.
+
+    A look lasts `_LOOK_S`: it is beyond the limit if the age always was, and within if it never was. Three such looks
+    in a row change the state; an age that hovers round the limit does not.
+    """
 
     def __init__(self) -> None:
         self.captured_s = self.came_s = -math.inf
-        self._intervals_s: deque[float] = deque(maxlen=_KEPT)
-        self._sizes: deque[int] = deque(maxlen=_KEPT)
-
-    @property
-    def interval_s(self) -> float:
-        known_s = median(self._intervals_s) if self._intervals_s else _FIRST_INTERVAL_S
-        return min(known_s, _LONGEST_INTERVAL_S)
+        self.limit_s: float | None = None
+        """Age from which a picture is old, which follows what is measured slowly; None while unknown"""
+        self.interval_s = _FIRST_INTERVAL_S
+        self.state = PictureState.FRESH
+        self._newest: deque[tuple[float, float, int]] = deque(maxlen=_MOST_SAMPLES)
+        """Time of arrival, interval and bytes of the pictures of the last `_WINDOW_S`"""
+        self._look_s = -math.inf
+        self._ages = [False, False]
+        """Whether this look has seen an age within the limit, and one beyond"""
+        self._alike = 0
+        """Number of looks in a row that were beyond the limit; below 0, that were within"""
+        self._alive = 0
+        """Number of looks since the view was silent"""
 
     @property
     def size_bytes(self) -> int:
-        return max(self._sizes, default=0)
+        return max((size for *_, size in self._newest), default=0)
 
     def note(self, captured_s: float, size_bytes: int, now_s: float) -> None:
         if 0.0 <= self.captured_s - captured_s < _OTHER_CLOCK_S:
             return
-        if captured_s > self.captured_s > -math.inf:
-            self._intervals_s.append(captured_s - self.captured_s)
-        self._sizes.append(size_bytes)
+        interval_s = captured_s - self.captured_s
+        known_s = interval_s if 0.0 < interval_s < math.inf else _FIRST_INTERVAL_S
+        self._newest.append((now_s, min(known_s, _LONGEST_INTERVAL_S), size_bytes))
         self.captured_s, self.came_s = captured_s, now_s
+
+    def measure(self, now_s: float) -> None:
+        while self._newest and now_s - self._newest[0][0] > _WINDOW_S:
+            self._newest.popleft()
+        self.interval_s = _tail((interval_s for _, interval_s, _ in self._newest), _USUAL) or self.interval_s
+
+    def follow(self, limit_s: float, passed_s: float) -> None:
+        if self.limit_s is None:
+            self.limit_s = limit_s
+        self.limit_s += min(max(limit_s - self.limit_s, -_FALLS * passed_s), _RISES * passed_s)
+
+    def look(self, age_s: float | None, now_s: float) -> None:
+        """Take in that the picture shown has this age; None if that is unknown, which counts as beyond any limit."""
+        silent = now_s - self.came_s > dead_after_s(self.interval_s)
+        self._ages[age_s is None or self.limit_s is None or age_s > self.limit_s] = True
+        if silent:
+            self.state, self._alike, self._alive, self._ages = PictureState.DEAD, 0, 0, [False, False]
+        if now_s - self._look_s < _LOOK_S:
+            return
+        self._look_s = now_s
+        match self._ages:
+            case [False, True]:
+                self._alike = max(self._alike, 0) + 1
+            case [True, False]:
+                self._alike = min(self._alike, 0) - 1
+            case _:
+                self._alike = 0
+        self._ages = [False, False]
+        self._alive += 1
+        if self._alike <= -_LOOKS:
+            self.state = PictureState.FRESH
+        elif self._alike >= _LOOKS or (self.state is PictureState.DEAD and self._alive >= _LOOKS):
+            self.state = PictureState.OLD
 
 
 class Pictures:
@@ -89,10 +138,12 @@ class Pictures:
         """As for `old_after_s`; set by the caller, who knows the emulated link"""
         self.hands = 1.0
         """Share of a page's motion that counts, 0 to 1; 1 if no picture has ever come"""
+        self.because = ""
+        """Why less than all of the hands counts, with the measured age; empty if all counts"""
         self._views = {name: _View() for name in VIEW_NAMES}
-        self._old_s: dict[ViewName, float | None] = dict.fromkeys(VIEW_NAMES)
         self._control_p95_s: float | None = None
-        self._fresh_s = self._measured_s = self._updated_s = -math.inf
+        self._fades = False
+        self._measured_s = self._updated_s = -math.inf
 
     def receive(self, payload: bytes, now_s: float) -> None:
         """Take a payload of the topic `video`; an invalid one is ignored."""
@@ -108,48 +159,65 @@ class Pictures:
         shown_s: capture time of the picture that the driving page shows, on the robot side's clock; None if unknown.
         """
         passed_s, self._updated_s = now_s - self._updated_s, now_s
-        if not math.isfinite(self._views[FIRST].came_s):
+        first = self._views[FIRST]
+        if not math.isfinite(first.came_s):
             return
         if now_s - self._measured_s >= _PERIOD_S:
-            self._measured_s = now_s
-            self._measure(core, now_s)
-        if not self._old(core.link.clock_offset.offset_s, shown_s, now_s):
-            self._fresh_s = now_s
-            self.hands = min(1.0, self.hands + passed_s / _RISE_S)
-        elif now_s - self._fresh_s > _PATIENCE_S:
-            self.hands = max(0.0, self.hands - passed_s / _FALL_S)
+            measured_s, self._measured_s = min(now_s - self._measured_s, 2.0 * _PERIOD_S), now_s
+            self._measure(core, measured_s, now_s)
+        age_s, offset_s = None, core.link.clock_offset.offset_s
+        for view in reversed(self._views.values()):
+            captured_s = view.captured_s if shown_s is None or view is not first else min(view.captured_s, shown_s)
+            age_s = None if offset_s is None else now_s - (captured_s - offset_s)
+            if math.isfinite(view.came_s):
+                view.look(age_s, now_s)
+        if first.state is PictureState.FRESH:
+            self._fades = False
+        elif not self._fades:
+            self._fades, self.because = _hide_motion(age_s, None if core.screen is None else core.screen.tool_speed_m_s)
+        change = -passed_s / _FALL_S if self._fades else passed_s / _RISE_S
+        self.hands = min(1.0, max(0.0, self.hands + change))
+        if self.hands == 1.0:
+            self.because = ""
 
     def facts(self) -> PictureFacts:
-        """Return the limits for the page."""
+        """Return states and limits for the page."""
         views = self._views.values()
-        return PictureFacts(tuple(self._old_s.values()), tuple(dead_after_s(view.interval_s) for view in views))
+        limits = tuple(view.limit_s for view in views), tuple(dead_after_s(view.interval_s) for view in views)
+        return PictureFacts(*limits, tuple(view.state for view in views))
 
-    def _measure(self, core: OperatorSide, now_s: float) -> None:
+    def _measure(self, core: OperatorSide, passed_s: float, now_s: float) -> None:
         newest = islice(reversed(core.link.recent), _MOST_SAMPLES)
         recent_s = (there_s for at_s, there_s, _ in newest if now_s - at_s <= _WINDOW_S)
-        known_s = _tail(there_s for there_s in recent_s if there_s is not None)
+        known_s = _tail((there_s for there_s in recent_s if there_s is not None), _TAIL)
         if known_s is not None:
             self._control_p95_s = known_s
-        if self._control_p95_s is None:
-            return
         kbit_s = core.status(now_s).rate_kbit_s
-        for name, view in self._views.items():
-            self._old_s[name] = old_after_s(
-                control_p95_s=self._control_p95_s,
-                video_later_s=self.video_later_s,
-                size_bytes=view.size_bytes,
-                rate_bit_s=None if kbit_s is None else 1e3 * kbit_s,
-                interval_s=view.interval_s,
-            )
-
-    def _old(self, offset_s: float | None, shown_s: float | None, now_s: float) -> bool:
-        view, limit_s = self._views[FIRST], self._old_s[FIRST]
-        if offset_s is None or limit_s is None or now_s - view.came_s > dead_after_s(view.interval_s):
-            return True
-        captured_s = view.captured_s if shown_s is None else min(view.captured_s, shown_s)
-        return now_s - (captured_s - offset_s) > limit_s
+        for view in self._views.values():
+            view.measure(now_s)
+            if self._control_p95_s is not None:
+                limit_s = old_after_s(
+                    control_p95_s=self._control_p95_s,
+                    video_later_s=self.video_later_s,
+                    size_bytes=view.size_bytes,
+                    rate_bit_s=None if kbit_s is None else 1e3 * kbit_s,
+                    interval_s=view.interval_s,
+                )
+                view.follow(limit_s, passed_s)
 
 
-def _tail(samples_s: Iterable[float]) -> float | None:
+def _hide_motion(age_s: float | None, speed_m_s: float | None) -> tuple[bool, str]:
+    """Return whether pictures of this age hide too much motion, and the words for it. What is unknown counts as too
+    much."""
+    if age_s is None:
+        return True, "the pictures' age is unknown"
+    if speed_m_s is None:
+        return True, f"pictures are {1e3 * age_s:.0f} ms old"
+    hidden_m = age_s * speed_m_s
+    words = f"pictures are {1e3 * age_s:.0f} ms old, in which the arm goes {1e3 * hidden_m:.0f} mm"
+    return (True, words) if hidden_m > _UNSEEN_M else (False, "")
+
+
+def _tail(samples_s: Iterable[float], share: float) -> float | None:
     ordered = sorted(samples_s)
-    return ordered[math.ceil(_TAIL * len(ordered)) - 1] if ordered else None
+    return ordered[math.ceil(share * len(ordered)) - 1] if ordered else None

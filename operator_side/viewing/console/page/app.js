@@ -135,14 +135,14 @@ function showFacts(message) {
   showCounts(facts);
 }
 
-// The operator side lets a page's hands fade while the pictures are old.
+// The operator side lets a page's hands fade while the pictures are old or the page is late, and says so.
 function showCounts({ page, hands: whose, status }) {
   const drives = run.live && whose === InputSource.BROWSER && page?.driver && status.state === MotionState.ARMED;
   const off = drives && page.counts < 1;
   document.body.classList.toggle("hands_off", Boolean(off));
   byId("hands_off").hidden = !off;
   const share = off && page.counts > 0 ? `hands at ${Math.round(100 * page.counts)} %` : "hands off";
-  if (off) text("hands_off", `PICTURES ARE OLD: ${share} until they are fresh`);
+  if (off) text("hands_off", `${share.toUpperCase()}: ${page.because}`);
 }
 
 // Show rate and queueing delay as measured by the robot side, lost packets, and streams that are held back.
@@ -228,7 +228,7 @@ function refresh() {
     because.textContent = ended ? "" : old + (open ? "The operator side is silent." : `The console: ${closedBecause || "not reached yet"}.`);
   }
   const limits = facts?.pictures;
-  views.forEach((view, k) => view.showAge(limits?.old_s[k] ?? null, limits?.dead_s[k]));
+  views.forEach((view, k) => view.showAge(limits?.states[k] ?? null, limits?.old_s[k] ?? null));
 }
 
 document.addEventListener("visibilitychange", () => send({ looks: !document.hidden }));

@@ -1,5 +1,7 @@
-// Camera views: the newest picture of each, with its age. The operator side works out what age is old.
-const DEAD_S = 0.5; // without the operator side's limits, as in an old recording
+// Camera views: the newest picture of each, with its age. The operator side decides whether it is old or dead.
+import { PictureState } from "./names.js";
+
+const DEAD_S = 0.5; // without the operator side's word, as in an old recording
 
 // Estimate of the operator side's clock, from the message with the least delay.
 export class Clock {
@@ -73,14 +75,14 @@ export class View {
     this.#busy = false;
   }
 
-  // oldS: age from which it is old, null while unknown; deadS: silence from which it is dead.
-  showAge(oldS, deadS = DEAD_S) {
+  // state: of the pictures, as the operator side says; oldS: age from which they are old. Both null while unknown.
+  showAge(state, oldS) {
     if (this.capturedS === null) return;
     const silentS = (this.#clock.nowMs - this.#shownMs) / 1000;
     const ageS = this.#clock.ageS(this.capturedS);
-    const dead = silentS > deadS;
-    const old = oldS !== null && ageS !== null && ageS > oldS;
-    this.#place.dataset.age = dead ? "dead" : old ? "old" : "fresh";
+    const shown = state ?? (silentS > DEAD_S ? PictureState.DEAD : PictureState.FRESH);
+    const dead = shown === PictureState.DEAD;
+    this.#place.dataset.age = shown;
     const ms = (seconds) => Math.max(0, 1000 * seconds).toFixed(0);
     this.#age.textContent = ageS === null ? "age unknown" : `${ms(ageS)} ms old`;
     this.#age.title = oldS === null ? "" : `amber beyond ${ms(oldS)} ms on this link`;
