@@ -31,6 +31,20 @@ def raise_priority() -> bool:
     return os.getpriority(os.PRIO_PROCESS, 0) <= _NICENESS
 
 
+def lower_priority(niceness: int) -> None:
+    """Give up the real-time scheduling and the priority that a companion inherits from a side; take this niceness.
+
+    A higher niceness stays. A companion has a session of its own, to which the niceness applies, too.
+    """
+    with contextlib.suppress(OSError):
+        os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
+    for thread in _threads():
+        with contextlib.suppress(OSError):
+            os.setpriority(os.PRIO_PROCESS, thread, max(niceness, os.getpriority(os.PRIO_PROCESS, thread)))
+    with contextlib.suppress(OSError):
+        _SESSION.write_text(str(niceness), encoding="ascii")
+
+
 def make_realtime() -> list[str]:
     """Set first-in-first-out scheduling for the present threads, and lock memory.
 

@@ -30,14 +30,14 @@ def play_on_page(recording: Recording, speed: float, port: int) -> int:
     """Play on the console from when a page is open until Ctrl-C; return 1 if the console's process ended, else 0."""
     title = f"{recording.path.name}, replayed"
     with StopSignal() as stop, Status("line", _PROGRAM) as status, Console(title, port=port, live=False) as console:
-        facts = msgspec.json.Decoder(OperatorFacts)
+        facts, clock = msgspec.json.Decoder(OperatorFacts), MonotonicClock()
         playback = Playback(recording, speed)
         opened, came, since_s = False, 0, 0.0
         said: dict[str, Any] = {}
 
         def look(seconds: float) -> bool:
-            if select.select([console], [], [], seconds)[0]:
-                console.receive()
+            select.select([console], [], [], seconds)
+            console.receive(clock.now())
             for text in console.take_notes():
                 status.note(text)
             return not (stop.is_set or console.gone)

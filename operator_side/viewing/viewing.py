@@ -124,7 +124,7 @@ class Viewing:
         return [encode(watch)]
 
     def _hear(self, console: Console, now_s: float) -> None:
-        console.receive()
+        console.receive(now_s)
         while console.words:
             page, said = console.words.popleft()
             if said is None:
@@ -142,7 +142,8 @@ class Viewing:
     def _looks_at_console(self, console: Console) -> bool:
         for text in console.take_notes():
             self._status.note(text)
-        if console.pages != self._open_pages:
+        # Pages of a console that is started again come back by themselves.
+        if console.pages != self._open_pages and (console.address is not None or console.gone):
             self._open_pages = console.pages
             self._status.event("pages", count=console.pages)
         if console.address not in (None, self._reported):

@@ -3,7 +3,6 @@
 TROUBLE: fault of a rendering backend that was tried before, one argument for each.
 """
 
-import contextlib
 import importlib.util
 import os
 import select
@@ -16,6 +15,7 @@ from common.clock import MonotonicClock
 from common.companion.channel import Channel
 from common.companion.process import companion_channel
 from common.protocol.view_messages import ViewName
+from common.realtime.priority import lower_priority
 from robot_side.viewing.exchange import Order, Picture, Ready, Refusal, Setup, decode_to_companion, encode
 from robot_side.viewing.off_screen import BACKENDS, REMEDY, silenced, trouble_with
 
@@ -23,14 +23,14 @@ if TYPE_CHECKING:
     from robot_side.viewing.h264 import H264
     from robot_side.viewing.rendering import Renderer
 
-_LATER = 5
-"""Niceness added to the niceness of the process that ticks"""
+_NICENESS = 5
+"""Niceness of this process: behind a browser on the same machine, so that pictures give way to keys"""
 
 
 def main() -> None:
     """Serve orders until the robot side's process has ended."""
     channel, troubles = companion_channel(sys.argv[1:])
-    _step_back()
+    lower_priority(_NICENESS)
     if (trouble := trouble_with(BACKENDS[len(troubles)])) is not None:
         troubles.append(trouble)
         if len(troubles) < len(BACKENDS):
@@ -44,14 +44,6 @@ def main() -> None:
         _refuse(channel, f"{error}; install it in the clone: pip install '.[robot]'")
         return
     _serve(channel)
-
-
-def _step_back() -> None:
-    """Give up the inherited real-time scheduling and priority, which rendering does not need."""
-    with contextlib.suppress(OSError, AttributeError):
-        os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
-    with contextlib.suppress(OSError):
-        os.nice(_LATER)
 
 
 def _refuse(channel: Channel, reason: str) -> None:

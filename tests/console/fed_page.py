@@ -45,7 +45,7 @@ class Fed:
         clock, pictures, step, driver = MonotonicClock(), Pictures(), 0, ""
         with Console("test") as console:
             while not self.ends.wait(0.05):
-                console.receive()
+                console.receive(clock.now())
                 self.address, now_s, step = console.address, clock.now(), step + 1
                 for _, said in console.words:
                     if said is not None and "hands" in said:

@@ -171,7 +171,7 @@ class Feed:
         self._next_s = 0.0
 
     def step(self, now_s: float) -> None:
-        self._console.receive()
+        self._console.receive(now_s)
         if now_s < self._next_s:
             return
         self._next_s = max(now_s, self._next_s + FACTS_PERIOD_S)

@@ -2,8 +2,8 @@
 
 Each message on the channel begins with a letter:
 
-operator side ──▶ here    f facts, v a view payload as received, n a note, r the constants of a run,
-                          p the position in a recording, d the run's normal end
+operator side ──▶ here    o, first, the port and the token, f facts, v a view payload as received, n a note,
+                          r the constants of a run, p the position in a recording, d the run's normal end
 here ──▶ operator side    a the address, w the number of visible pages, s a page's message, e why there is no console,
                           l the H.264 pictures that are lacking: first once H.264 can be shown, then at each change
 """
@@ -13,14 +13,13 @@ import contextlib
 import logging
 import math
 import os
-import secrets
+import select
 import socket
 import struct
 import sys
 import threading
 from collections.abc import Iterator
 from itertools import islice
-from pathlib import Path
 from typing import Any, Final
 
 import msgspec
@@ -39,13 +38,14 @@ from common.protocol.view_messages import (
     VideoFrame,
     VideoStep,
 )
+from common.realtime.priority import lower_priority
 from common.roles import ROLES, Role
 from common.status.codes import Border, InputSource
 from operator_side.controller.feel import SENSED_TRAVEL
 from operator_side.viewing.facts import OperatorFacts, ShownKind
 
-_NICENESS: Final = 5
-"""Increment of this process's niceness once it serves, so that both sides have priority"""
+_NICENESS: Final = 0
+"""Niceness of this process, the browser's, as the page waits for it; both sides have priority"""
 _FRAME: Final = struct.Struct("<Bd")
 """Header of a picture: number of its view, and its capture time on the robot side's clock"""
 _MOST_LISTED: Final = 6
@@ -71,9 +71,18 @@ class _Process:
         self._drawn_s = -math.inf
         self._steps: Any = None
         self._lacks: tuple[int, int] | None = None
+        self._early: list[bytes] = []
+        """Messages that came before this process served"""
 
-    def run(self, port: int, token: str) -> None:
+    def run(self) -> None:
         """Serve until the channel ends. If serving is impossible, report the reason through the channel."""
+        lower_priority(_NICENESS)
+        while not self._early and not self._channel.ended:
+            select.select([self._channel], [], [])
+            self._early += self._channel.receive()
+        if not self._early:
+            return
+        port, token = msgspec.msgpack.decode(self._early.pop(0)[1:], type=tuple[int, str])
         try:
             from operator_side.viewing.console.cues import Cues  # noqa: PLC0415  # an extra, and slow to import
             from operator_side.viewing.console.drawing import Drawing  # noqa: PLC0415
@@ -117,7 +126,7 @@ class _Process:
 
     def _begin(self, loop: Any, address: str) -> None:
         self._say("a", address.encode())
-        os.nice(_NICENESS)
+        loop.call_soon(self._receive)
         loop.add_reader(self._channel.fileno(), self._receive)
 
     def _follow(self, steps: Any) -> None:
@@ -135,7 +144,8 @@ class _Process:
     def _receive(self) -> None:
         try:
             state: SceneState | None = None
-            for message in self._channel.receive():
+            early, self._early = self._early, []
+            for message in (*early, *self._channel.receive()):
                 state = self._take(message[:1], message[1:]) or state
             if state is not None:
                 with self._skipping():
@@ -254,10 +264,10 @@ def said(facts: OperatorFacts) -> dict[str, Any]:
 
 
 def main() -> None:
-    """Run the console process. Arguments: the channel's file descriptor, the port, and a file with a token, if any."""
-    channel, (port, *token) = companion_channel(sys.argv[1:])
+    """Run the console process. Argument: the channel's file descriptor."""
+    channel, _ = companion_channel(sys.argv[1:])
     logging.getLogger("websockets").setLevel(logging.CRITICAL)  # no line for each refused request
-    _Process(channel).run(int(port), Path(token[0]).read_text().strip() if token else secrets.token_urlsafe(24))
+    _Process(channel).run()
     os._exit(0)  # does not wait for viser's thread
 
 

@@ -1,9 +1,12 @@
 """Access of the operator side to its console: a separate process that never blocks this one."""
 
+import secrets
+import threading
 from collections import deque
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final, Self
+from urllib.parse import urlsplit
 
 import msgspec
 
@@ -16,16 +19,27 @@ _FACTS_WAIT_BYTES: Final = 1 << 20
 """Number of waiting bytes above which facts are skipped"""
 _MOST_HEARD: Final = 256
 """Maximum number of pages' messages that wait for the caller"""
+_MOST_NOTES: Final = 50
+"""Maximum number of notes kept for a process that is started again"""
+_AGAIN_S: Final = 1.0
+"""Seconds from the process's unexpected end until another one is started"""
+_MOST_ENDS, _WITHIN_S = 3, 60.0
+"""Greatest number of unexpected ends within that many seconds after which another process is started"""
 _END_LIMIT_S: Final = 1.0
 """Seconds to wait for the console process to end before it is killed: it has nothing to save"""
 
+
+_MODULE: Final = "operator_side.viewing.console"
 
 PageWords = tuple[int, dict[str, Any] | None]
 """Number of a page, and its message: any of `PASSED_ON` (pages.py); None if the page has closed."""
 
 
 class Console:
-    """Browser console. Without viser no page is served, and a note says so."""
+    """Browser console. Without viser no page is served, and a note says so.
+
+    A process that ends unexpectedly is started again, at the same address. Until then its pages count as closed.
+    """
 
     def __init__(self, title: str, *, port: int = 0, live: bool = True, token: Path | None = None) -> None:
         """Start the console process on `port` of this machine; 0 for any free port. live: not a replayed recording.
@@ -46,11 +60,28 @@ class Console:
         """Open pages that have sent hands."""
         self._notes: list[str] = []
         self.gone = False
-        """Whether the console process has ended; a note gives the reason."""
-        given = [] if token is None else [str(token)]
-        self._companion = Companion("operator_side.viewing.console", [str(port), *given])
-        run = {"title": title, "live": live, "may_run_again": token is not None}
-        self._companion.channel.send(b"r", msgspec.msgpack.encode(run))
+        """Whether the console process has ended for good; a note gives the reason."""
+        self._port = port
+        self._token = secrets.token_urlsafe(24) if token is None else token.read_text().strip()
+        self._run = msgspec.msgpack.encode({"title": title, "live": live, "may_run_again": token is not None})
+        self._kept: deque[str] = deque(maxlen=_MOST_NOTES)
+        self._ends_s: deque[float] = deque(maxlen=_MOST_ENDS + 1)
+        """Times of the process's newest unexpected ends"""
+        self._again_s: float | None = None
+        """Time to start another process; None while one runs or starts"""
+        self._started: list[Companion | OSError] = []
+        self._companion = Companion(_MODULE)
+        self._runs = False
+        """Whether a process runs whose end has not been noted"""
+        self._begin()
+
+    def _begin(self) -> None:
+        companion, self._runs = self._companion, True
+        # Not on the command line, which other users of the machine can list.
+        companion.channel.send(b"o", msgspec.msgpack.encode((self._port, self._token)))
+        companion.channel.send(b"r", self._run)
+        for text in self._kept:
+            companion.channel.send(b"n", text.encode())
 
     def __enter__(self) -> Self:
         return self
@@ -78,29 +109,50 @@ class Console:
 
     def note(self, text: str) -> None:
         """Show a line that stays on the pages."""
+        self._kept.append(text)
         self._companion.channel.send(b"n", text.encode())
 
-    def receive(self) -> None:
-        """Take the messages of the console process; call it often."""
+    def receive(self, now_s: float) -> None:
+        """Take the messages of the console process, and start it again if it has ended; call it often."""
+        self._start_again(now_s)
         channel = self._companion.channel
-        if self.gone:
+        if not self._runs:
             return
         for message in channel.receive():
             kind, content = message[:1], message[1:]
             if kind == b"a":
                 self.address = content.decode()
+                self._port = urlsplit(self.address).port or 0
             elif kind == b"w":
                 before, self.pages = self.pages, int(content)
                 self.came += self.pages > before
             elif kind == b"l":
                 self.lacks = msgspec.msgpack.decode(content, type=tuple[int, int])
             elif kind == b"e":
-                self._end(f"no console: {content.decode()}")
+                self._end(f"no console: {content.decode()}", for_good=True)
                 return
             elif kind == b"s":
                 self._hear(*msgspec.msgpack.decode(content, type=PageWords))
         if channel.ended:
-            self._end("the console has ended; the run continues without it")
+            self._ends_s.append(now_s)
+            for_good = len(self._ends_s) > _MOST_ENDS and now_s - self._ends_s[0] < _WITHIN_S
+            self._again_s = None if for_good else now_s + _AGAIN_S
+            then = "the run continues without it" if for_good else "it is started again, and no page drives meanwhile"
+            self._end(f"the console has ended; {then}", for_good=for_good)
+
+    def _start_again(self, now_s: float) -> None:
+        if self._again_s is not None and now_s >= self._again_s:
+            self._again_s = None
+            # In a thread, as starting a process takes milliseconds.
+            threading.Thread(target=_start, args=(self._started,), daemon=True).start()
+        if self._started:
+            started = self._started.pop()
+            if isinstance(started, OSError):
+                self._end(f"no console: no process can be started: {started.strerror}", for_good=True)
+                return
+            self._companion.close(0.0)
+            self._companion = started
+            self._begin()
 
     def _hear(self, page: int, said: dict[str, Any] | None) -> None:
         self.words.append((page, said))
@@ -109,10 +161,10 @@ class Console:
         elif "hands" in said:
             self._handling.add(page)
 
-    def _end(self, why: str) -> None:
+    def _end(self, why: str, *, for_good: bool) -> None:
         """Note the end of the console process: report every page that sent hands as closed."""
-        self.gone, self.address = True, None
-        self.pages = 0
+        self._runs, self.gone = False, for_good
+        self.address, self.pages, self.lacks = None, 0, None
         for page in sorted(self._handling):
             self._hear(page, None)
         self._notes.append(why)
@@ -127,3 +179,10 @@ class Console:
         self._companion.channel.send(b"d", b"")
         self._companion.channel.flush()
         self._companion.close(_END_LIMIT_S)
+
+
+def _start(started: list[Companion | OSError]) -> None:
+    try:
+        started.append(Companion(_MODULE))
+    except OSError as error:
+        started.append(error)

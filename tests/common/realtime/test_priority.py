@@ -53,6 +53,18 @@ def test_a_process_from_before_the_first_session_has_none_to_raise(
 
 
 @pytest.mark.processes
+def test_what_a_companion_inherits_is_given_up_and_a_higher_niceness_stays() -> None:
+    said = run(
+        "import os\nfrom common.realtime.priority import lower_priority, raise_priority\n"
+        "os.setsid()\nraise_priority()\n"
+        "for niceness in (0, 7, 5):\n"
+        "    lower_priority(niceness)\n"
+        "    print(os.getpriority(os.PRIO_PROCESS, 0), os.sched_getscheduler(0) == os.SCHED_OTHER)"
+    )
+    assert said.splitlines() == ["0 True", "7 True", "7 True"]
+
+
+@pytest.mark.processes
 def test_realtime_is_granted_or_a_note_names_the_command_that_permits_it() -> None:
     said = run(
         "import os\nfrom common.realtime.priority import make_realtime\n"

@@ -121,6 +121,7 @@ class FakeConsole:
     def __init__(self) -> None:
         self.pages = 0
         self.address: str | None = None
+        self.gone = False
         self.notes: list[str] = []
         self.shown: list[OperatorFacts] = []
         self.views: list[tuple[bytes, bool]] = []
@@ -128,7 +129,7 @@ class FakeConsole:
         self.lacks: tuple[int, int] | None = None
         self.words: deque[PageWords] = deque()
 
-    def receive(self) -> None: ...
+    def receive(self, now_s: float) -> None: ...
 
     def take_notes(self) -> list[str]:
         return [self.notes.pop() for _ in range(len(self.notes))]

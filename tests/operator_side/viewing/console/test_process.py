@@ -54,7 +54,14 @@ def until(console: Console, so: Callable[[], bool], feed: Feed | None = None) ->
     end_s = CLOCK.now() + LIMIT_S
     while not so():
         assert CLOCK.now() < end_s, console.take_notes()
-        (console.receive if feed is None else lambda: feed.step(CLOCK.now()))()
+        step(console, feed)
+
+
+def step(console: Console, feed: Feed | None) -> None:
+    if feed is None:
+        console.receive(CLOCK.now())
+    else:
+        feed.step(CLOCK.now())
 
 
 def address_of(console: Console) -> str:
@@ -83,7 +90,7 @@ async def fed(console: Console, feed: Feed | None = None) -> AsyncIterator[None]
 
     async def feeds() -> None:
         while not ends.is_set():
-            (console.receive if feed is None else lambda: feed.step(CLOCK.now()))()
+            step(console, feed)
             await asyncio.sleep(0.002)
 
     ends = asyncio.Event()
@@ -109,7 +116,7 @@ def test_steps_become_pictures_and_a_gap_is_told(console: Console) -> None:
 
     encoder, gray = H264(), np.full((48, 64, 3), 128, np.uint8)
 
-    def step(*, whole: bool = False) -> bytes:
+    def picture(*, whole: bool = False) -> bytes:
         content, is_whole = encoder.encode(gray, 75, whole=whole)
         place = Header(1, 2, 3.0), "first_person", 1.5, 64, 48
         return encode(VideoStep(*place, encoder.number, is_whole, content))  # type: ignore[arg-type]
@@ -120,7 +127,7 @@ def test_steps_become_pictures_and_a_gap_is_told(console: Console) -> None:
                 await asyncio.sleep(0.002)
             assert console.lacks == (0, 0)
             for lost, whole, lacks in ((False, False, 0), (True, False, 0), (False, False, 3), (False, True, 0)):
-                payload = step(whole=whole)
+                payload = picture(whole=whole)
                 if lost:
                     continue
                 console.view(payload, video=True)
@@ -188,26 +195,48 @@ def test_pages_get_facts_pictures_and_the_scene_as_they_are_fed(console: Console
     asyncio.run(story())
 
 
-def test_the_hands_of_a_console_that_is_killed_are_gone_and_the_run_goes_on() -> None:
+def test_a_console_that_is_killed_releases_hands_and_comes_back_at_its_address_a_few_times() -> None:
     async def story(console: Console) -> None:
         async with fed(console), page(console) as first, page(console):
             await first.send('{"hands": {"Space": true}}')
             assert await heard(console) == {"hands": {"Space": True}}
             os.kill(console._companion.process_id, signal.SIGKILL)
-            while not console.gone:
+            while console.address is not None:
                 await asyncio.sleep(0.002)
+
+    async def come_back(console: Console) -> None:
+        async with fed(console), page(console) as opened:
+            messages = [str(await opened.recv()) for _ in range(3)]
+            assert {msgspec.json.decode(message)["kind"] for message in messages} == {"run", "note", "end"}
+
+    def killed(console: Console, at_s: float) -> list[str]:
+        os.kill(console._companion.process_id, signal.SIGKILL)
+        while not (notes := console.take_notes()):
+            console.receive(at_s)
+        return notes
 
     with Console("a test") as console:
         until(console, lambda: console.address is not None)
+        console.note("said before")
+        before = address_of(console)
         asyncio.run(story(console))
-        assert list(console.words) == [(1, None)]
-        assert (console.pages, console.address) == (0, None)
-        assert console.take_notes() == ["the console has ended; the run continues without it"]
+        again = ["the console has ended; it is started again, and no page drives meanwhile"]
+        assert (list(console.words), console.pages, console.take_notes()) == ([(1, None)], 0, again)
+        until(console, lambda: console.address is not None)
+        assert address_of(console) == before
+        asyncio.run(come_back(console))
+        first_id, now_s = console._companion.process_id, CLOCK.now()
+        assert urlsplit(before).path.strip("/") not in Path(f"/proc/{first_id}/cmdline").read_text()
+        for k in (1, 2):
+            assert killed(console, now_s + k) == again
+            while console._companion.process_id == first_id:
+                console.receive(now_s + k + 1.0)
+            first_id = console._companion.process_id
+        assert killed(console, now_s + 4.0) == ["the console has ended; the run continues without it"]
         feed = Feed(console)
         for _ in range(100):
-            feed.step(CLOCK.now())
-        console.note("to nobody")
-        assert (console.take_notes(), console.pages) == ([], 0)
+            feed.step(now_s + 5.0)
+        assert (console.gone, console.take_notes(), console.pages, console.address) == (True, [], 0, None)
 
 
 def test_a_message_that_is_too_large_ends_its_page_alone(console: Console) -> None:
