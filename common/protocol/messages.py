@@ -30,6 +30,7 @@ _SLOWEST = 2.0**-20
 _Words = Annotated[str, Meta(max_length=200)]
 _Number = Annotated[int, Meta(ge=0, le=_LARGEST)]
 _Few = Annotated[int, Meta(ge=0, le=1000)]
+_Rate = Annotated[float, Meta(ge=0.1, le=1000.0)]
 _Far = Annotated[float, Meta(ge=0.0, le=FARTHEST_M)]
 _Place = tuple[Finite, Finite, Finite]
 _Turn = Annotated[float, Meta(ge=-4.0, le=4.0)]
@@ -135,6 +136,12 @@ class Watch(Message, frozen=True, tag="watch"):
     lacks: tuple[_Number, _Number] | None = None
     """For each view, `number` of the newest VideoStep that could not be shown, 0 for none. None: the sender can show
     only JPEG."""
+    picture_hz: _Rate | None = None
+    """Most pictures of each view in a second that the sender keeps up with; None for no limit"""
+    halved: bool = False
+    """Whether the sender keeps up only with pictures of half the width and height"""
+    scene_hz: _Rate | None = None
+    """Most states of the scene in a second, likewise"""
 
 
 class Tune(Message, frozen=True, tag="tune"):

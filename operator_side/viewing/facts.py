@@ -73,6 +73,14 @@ class HandsFacts(msgspec.Struct, frozen=True):
     """For L2 and R2, whether the pull of the page's keys yields to stiff zones, as a finger of 2 N would"""
     because: str = ""
     """Why less than all of a page's motion counts, with what was measured; empty if all counts"""
+    released: str = ""
+    """Why a page's inputs were last released without its doing, with what was measured; empty if they never were"""
+    late_s: float | None = None
+    """Age of the pages' answers; None if no page is visible"""
+    fewer: bool = False
+    """Whether pictures are fewer or smaller because a page was late"""
+    seldom: bool = False
+    """Whether the scene and the charts are drawn less often, too"""
 
 
 class PictureState(StrEnum):

@@ -118,13 +118,20 @@ class Viewing:
         if now_s - self._watch_s < (_WATCH_PERIOD_S if watches else _EXPECT_PERIOD_S) and not (pages and stands_still):
             return []
         self._watch_s, self._asked = now_s, lacks is not None and any(lacks)
-        watch = Watch(self._core.link.stamp(now_s), overview=pages, first_person=pages, scene=watches, lacks=lacks)
+        pace = self._pages.pace.now
+        watch = Watch(
+            *(self._core.link.stamp(now_s), pages, pages, watches, lacks),
+            picture_hz=pace.picture_hz,
+            halved=pace.halved,
+            scene_hz=pace.scene_hz,
+        )
         if self._recording is not None:
             self._recording.noted.append((Kind.WATCHED, now_s, b""))
         return [encode(watch)]
 
     def _hear(self, console: Console, now_s: float) -> None:
         console.receive(now_s)
+        self._pages.pace.update(console.late_s, now_s)
         while console.words:
             page, said = console.words.popleft()
             if said is None:

@@ -39,6 +39,13 @@ class Watchers:
         first, second = (max(numbers) for numbers in zip(*known, strict=True))
         return first, second
 
+    def pace(self, now_s: float) -> tuple[float, bool, float]:
+        """Return the limits of the slowest viewer: `picture_hz`, infinite for none, `halved` and `scene_hz`."""
+        watches = [watch for watch, heard_s in self._watching.values() if now_s - heard_s < WATCH_S]
+        picture_hz = min((watch.picture_hz or math.inf for watch in watches), default=math.inf)
+        scene_hz = min((watch.scene_hz or math.inf for watch in watches), default=math.inf)
+        return picture_hz, any(watch.halved for watch in watches), scene_hz
+
     def looked_at(self, now_s: float) -> frozenset[str]:
         """Return which of `overview`, `first_person` and `scene` are watched."""
         if not self._watching:

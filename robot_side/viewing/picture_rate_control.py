@@ -52,6 +52,8 @@ class PictureRateControl:
     def __init__(self, rate_hz: float, quality: int) -> None:
         self._steps = steps(rate_hz, quality)
         self._at = 0
+        self.most_hz, self.halved = math.inf, False
+        """Greatest rate that the viewers keep up with, and whether only with half the width and height"""
         self._h264 = False
         self._full_bytes: dict[bool, float] = {}
         """Bytes of a picture of quality 75 and full size; the key tells whether it is H.264"""
@@ -60,7 +62,11 @@ class PictureRateControl:
     @property
     def step(self) -> Step:
         """Present step"""
-        return self._steps[self._at]
+        return self._limited(self._at)
+
+    def _limited(self, at: int) -> Step:
+        step = self._steps[at]
+        return step._replace(rate_hz=min(step.rate_hz, self.most_hz), halved=step.halved or self.halved)
 
     def made(self, size_bytes: int, step: Step, *, h264: bool = False) -> None:
         """Update the known size of pictures by a picture that was made in `step`."""
@@ -86,6 +92,6 @@ class PictureRateControl:
         return self.step
 
     def _needed_bit_s(self, at: int, views: int) -> float:
-        step = self._steps[at]
+        step = self._limited(at)
         full_bytes = self._full_bytes.get(self._h264, _FIRST_BYTES[self._h264])
         return 8.0 * views * step.rate_hz * step.bytes_share(h264=self._h264) * full_bytes

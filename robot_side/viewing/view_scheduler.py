@@ -68,6 +68,7 @@ class ViewScheduler:
         self._next_figures_s = self._next_look_s = -math.inf
         self._next_s: dict[str, float] = {}
         self._late: set[str] = set()
+        self._scene_hz = math.inf
         self._next_shapes_s = -math.inf
         self._begun = -1
         self._counts = {name: {"sent": 0, "nobody_looks": 0, "behind": 0} for name in (*VIEW_NAMES, "scene")}
@@ -88,6 +89,10 @@ class ViewScheduler:
         if not looked_at and now_s < self._next_look_s:
             return []
         self._next_look_s = now_s + _SEEN_TO_S
+        most_hz, halved, self._scene_hz = self._session.watchers.pace(now_s)
+        if self._cameras is not None:
+            control = self._cameras.picture_rate_control
+            control.most_hz, control.halved = most_hz, halved
         due = set()
         for name, counts in self._counts.items():
             turns = self._turns(name, now_s)
@@ -126,7 +131,7 @@ class ViewScheduler:
     def _turns(self, name: str, now_s: float) -> int:
         """Return how many times the view `name` has become due since the last call."""
         rate_hz = None if name == "scene" or self._cameras is None else self._cameras.picture_rate_control.step.rate_hz
-        period_s = SCENE_PERIOD_S if rate_hz is None else 1.0 / rate_hz
+        period_s = max(SCENE_PERIOD_S, 1.0 / self._scene_hz) if rate_hz is None else 1.0 / rate_hz
         # The views alternate, so that neither waits for the other.
         next_s = self._next_s.setdefault(name, now_s + (0.5 * period_s if name == VIEW_NAMES[1] else 0.0))
         if now_s < next_s:

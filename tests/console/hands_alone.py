@@ -35,7 +35,11 @@ _PAGE: Final = b"""<!doctype html><meta charset="utf-8"><title>hands</title><lin
   window.sent = [];
   window.clicked = 0;
   document.getElementById("other").onclick = () => { window.clicked += 1; };
-  window.hands = new Hands(document, (message) => { window.sent.push([performance.now(), JSON.stringify(message)]); });
+  let number = 0; // as wire.js numbers inputs
+  window.hands = new Hands(document, (message) => {
+    if (message.hands) message.hands.number = number++;
+    window.sent.push([performance.now(), JSON.stringify(message)]);
+  });
 </script>"""
 _MADE: Final = {"/": ("html", _PAGE), "/names.js": ("javascript", names().encode())}
 _SILENT_STATUS: Final = {"state": "disarmed", "link": "up", "owner": "ready"}
@@ -138,8 +142,9 @@ class HandsAlone:
                 "person": self.person,
                 "tuning_refused": "",
                 "link_asked": None,
-                "counts": self.pages.pictures.hands,
+                "counts": self.pages.counts,
                 "reset_first": self.pages.reset_first,
+                "released": self.pages.released,
             },
         } | self.facts
 

@@ -6,13 +6,12 @@ import time
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 import msgspec
 
 from common.command.status import Status
 from common.command.stop_signal import StopSignal
-from common.processors import usable_processors
 from common.status.codes import LinkState
 from common.status.statuses import OperatorStatus, RobotStatus
 from feelahead.both_sides.processes import SideFailedError, SideProcess
@@ -27,9 +26,6 @@ a very busy machine, it reports every few seconds."""
 _LINK_TIMEOUT_S = 30.0
 _WITHOUT_PAGES_S = 30.0
 """Duration of a run without pages, in seconds, unless --duration is given"""
-_FEW_PROCESSORS: Final = 2
-SMALL_PICTURES: Final = ("--cameras.width=320", "--cameras.height=240", "--cameras.rate-hz=15")
-"""Pictures that few processors can draw, code and show beside both sides (docs/console.md)"""
 _SHARED = ("link", "link_model", "asymmetry", "tick_period", "full_rate", "seed", "realtime")
 """Flags that the demo passes to both sides."""
 
@@ -52,8 +48,6 @@ def run_both(
         SideProcess("robot_side", "robot", robot_arguments(settings, given, summaries["robot"], listening)) as robot,
     ):
         status.event("started", side="robot", process_id=robot.process_id)
-        if settings.has_pages and has_small_pictures(settings):
-            status.note("pictures are 320x240 at 15 Hz, as this machine has at most two processors (docs/console.md)")
         operator_flags = operator_arguments(settings, given, summaries["operator"], listening, page)
         with SideProcess("operator_side", "operator", operator_flags) as operator:
             status.event("started", side="operator", process_id=operator.process_id)
@@ -74,14 +68,6 @@ def run_both(
     return errors
 
 
-def has_small_pictures(settings: DemoSettings) -> bool:
-    """Return whether pictures are small, as large ones would make keys late; a file for the robot side decides itself.
-
-    Both sides, the drawing process and a browser share this machine's processors.
-    """
-    return settings.robot_config is None and usable_processors() <= _FEW_PROCESSORS
-
-
 def too_slow(settings: DemoSettings) -> str | None:
     """Return an error text if the delay of the given link is too long for the sides to connect in time, else None."""
     link = settings.link_spec()
@@ -100,11 +86,10 @@ def robot_arguments(
     """Return the robot side's flags; of the demo's flags only those that the user gave: they override its file."""
     # With a file of settings, the file decides whether tuning is permitted.
     config = "--permit-tuning" if settings.robot_config is None else f"--config={settings.robot_config}"
-    small = SMALL_PICTURES if has_small_pictures(settings) else ()
     watched = ["--cameras.at-once"] if settings.has_pages else []
     own = _flags(settings, given, *_SHARED, "scene", "model", "site", "site_axis", "probability", "assist", "law")
     ports = f"--bind={listening['control']}", f"--view-bind={listening['view']}"
-    return [*_files(settings, summary), *ports, config, *watched, *small, *own]
+    return [*_files(settings, summary), *ports, config, *watched, *own]
 
 
 def operator_arguments(

@@ -5,6 +5,7 @@ Each message on the channel begins with a letter:
 operator side ──▶ here    o, first, the port and the token, f facts, v a view payload as received, n a note,
                           r the constants of a run, p the position in a recording, d the run's normal end
 here ──▶ operator side    a the address, w the number of visible pages, s a page's message, e why there is no console,
+                          t how late the pages' answers are, in seconds, while a page is visible,
                           l the H.264 pictures that are lacking: first once H.264 can be shown, then at each change
 """
 
@@ -53,6 +54,7 @@ _LAST_WORDS_S: Final = 0.3
 """Seconds that pages have to receive the last message before the process ends"""
 _SLOW_PERIOD_S: Final = 0.25
 """Seconds between scene updates if a browser draws without a graphics processor"""
+_LATENESS_PERIOD_S: Final = 0.25
 _LASTING: Final = {b"r": ShownKind.RUN, b"p": ShownKind.PLAYER}
 
 
@@ -126,8 +128,14 @@ class _Process:
 
     def _begin(self, loop: Any, address: str) -> None:
         self._say("a", address.encode())
+        self._tell_lateness(loop)
         loop.call_soon(self._receive)
         loop.add_reader(self._channel.fileno(), self._receive)
+
+    def _tell_lateness(self, loop: Any) -> None:
+        if (late_s := self._pages.late_s(loop.time())) is not None:
+            self._say("t", msgspec.msgpack.encode(late_s))
+        loop.call_later(_LATENESS_PERIOD_S, self._tell_lateness, loop)
 
     def _follow(self, steps: Any) -> None:
         self._steps = steps

@@ -2,6 +2,8 @@
 
 import asyncio
 import contextlib
+import math
+from collections import deque
 from collections.abc import Callable
 from typing import Any, Final
 
@@ -19,6 +21,10 @@ _A_SECOND: Final = 500
 """Maximum number of messages from a page in a second, for inputs 50 times a second and at each change"""
 _TOO_MANY, _NOT_OURS = 1013, 1008
 """WebSocket close codes: try again later; policy violation"""
+
+_RECENT_S: Final = 1.0
+_TAIL: Final = 0.9
+_MOST_AGES: Final = 100
 
 ROUND_ENDS: Final = f'{{"kind":"{ShownKind.END}"}}'
 """Message that a page answers with `taken`"""
@@ -41,8 +47,8 @@ class Said(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     looks: bool | None = None
     """Whether the page's tab is visible; a hidden tab is sent only lasting messages"""
     taken: bool | None = None
-    """Answer to ROUND_ENDS: the next batch may follow. Without this answer a slow page would fall behind without limit,
-    as browsers queue all unread messages."""
+    """Answer to ROUND_ENDS with the next frame that is drawn: the next batch may follow. Without this answer a slow
+    page would fall behind without limit, as browsers queue all unread messages."""
 
 
 PASSED_ON: Final = ("hands", "tune", "mark", "play", "again")
@@ -58,6 +64,24 @@ class _Page:
         self.taken = asyncio.Event()
         self.slow = False
         self.looks = True
+        self._asked_s: float | None = None
+        """Time of the newest batch; None once it is answered"""
+        self._ages_s: deque[tuple[float, float]] = deque(maxlen=_MOST_AGES)
+        """Times and ages of the newest answers"""
+
+    def answered(self, now_s: float) -> None:
+        """Note an answer to the newest batch."""
+        if self._asked_s is not None:
+            self._ages_s.append((now_s, now_s - self._asked_s))
+        self._asked_s = None
+        self.taken.set()
+
+    def late_s(self, now_s: float) -> float | None:
+        """Return the age of answers, in seconds, that one in ten of the last second exceeds; None without any."""
+        ages_s = [age_s for at_s, age_s in self._ages_s if now_s - at_s < _RECENT_S]
+        if self._asked_s is not None:
+            ages_s.append(now_s - self._asked_s)
+        return sorted(ages_s)[math.ceil(_TAIL * len(ages_s)) - 1] if ages_s else None
 
     async def send(self, connection: ServerConnection) -> None:
         with contextlib.suppress(ConnectionClosed):  # `_listen` notices it, too
@@ -68,6 +92,7 @@ class _Page:
                 this_round, self.newest = self.newest, {}
                 for message in (*this_round.values(), ROUND_ENDS):
                     await connection.send(message)
+                self._asked_s = asyncio.get_running_loop().time()
                 await self.taken.wait()
 
 
@@ -87,6 +112,11 @@ class Pages:
     def slow(self) -> bool:
         """Whether any page draws the scene slowly."""
         return any(page.slow for page in self._pages.values())
+
+    def late_s(self, now_s: float) -> float | None:
+        """Return how late the visible pages' answers are, in seconds, by the latest page; None without any."""
+        known_s = (page.late_s(now_s) for page in self._pages.values() if page.looks)
+        return max((late_s for late_s in known_s if late_s is not None), default=None)
 
     def show(self, kind: str, message: bytes | str, *, lasting: bool = False) -> None:
         """Queue a message for the visible pages; it replaces an unsent one of the same kind.
@@ -149,7 +179,7 @@ class Pages:
                 await connection.close(_NOT_OURS)
                 return
             if said.taken is not None:
-                page.taken.set()
+                page.answered(now_s)
             if said.slow is not None:
                 page.slow = said.slow
             if said.looks is not None and said.looks != page.looks:

@@ -119,7 +119,7 @@ class BrowserHands:
 
     def _held(self, hands: PageHands, pressed: set[Action], passed_s: float) -> ControllerState:
         pressed |= {action for name, action in _BUTTONS.items() if getattr(hands, name)}
-        counts = self._pages.pictures.hands
+        counts = self._pages.counts
         if not self._moves or counts <= _MOVES_GRIPPER:
             pressed.discard(Action.HOME)
         elif hands.gripper in _GRIPPER:

@@ -7,7 +7,11 @@ nobody ─▶ resting ─▶ ready ─▶ running         the first page that as
              └─────────┴─────────┘  on another key before hold-to-run, hold-to-run released, a stop, a disarmed arm
 
 After a stop the inputs rest until the stop is reset: hold-to-run alone never arms again.
-After 150 ms of silence, or when the driving page stops driving or closes, nobody drives; the next page rests first.
+After 300 ms of silence, or when the driving page stops driving or closes, nobody drives; the next page rests first.
+
+A key may come up while the page's drawing is late, and so unseen. So unconfirmed inputs, whether the page is late or
+silent, count in full for 150 ms, and less and less until 300 ms: the motion of a key that came up is at most 0.225 s of
+its speed, 19 mm more than if it ended at 150 ms, at 250 mm/s. After a second all keys must be up.
 """
 
 from collections import deque
@@ -19,11 +23,17 @@ from common.episode import EpisodeMark
 from common.status.codes import Doing
 from operator_side.core import OperatorSide
 from operator_side.viewing.facts import HandsFacts
+from operator_side.viewing.pages.pace import PagePace
 from operator_side.viewing.pages.page_messages import PageHands, PageMessage, TuneWish
 from operator_side.viewing.pages.pictures import Pictures
 
-SILENCE_S: Final = 0.15
-"""Seconds of silence after which a page no longer drives, and its emergency stop counts as released."""
+IN_FULL_S, SILENCE_S = 0.15, 0.3
+"""Age of unconfirmed inputs up to which they count in full, and from which they move nothing. After `SILENCE_S` without
+any message a page no longer drives, and its emergency stop counts as released."""
+ABSENT_S: Final = 1.0
+"""Age of unconfirmed inputs after which all keys must be up first"""
+_RISE_S: Final = 0.5
+"""Time in which inputs count again once they are confirmed, in seconds"""
 REST_S: Final = 1.0
 """Seconds for which all keys must be up before hold-to-run counts."""
 _MOST_WISHES: Final = 16
@@ -49,7 +59,15 @@ class DrivingPage:
         self._refused: set[int] = set()
         self._driver: int | None = None
         self._newest: PageHands | None = None
-        self._heard_s = 0.0
+        self._heard_s = self._asked_s = 0.0
+        self._confirmed = 1.0
+        """Share of the inputs that counts, as far as the page confirms them"""
+        self._latest_s = 0.0
+        """Greatest age of unconfirmed inputs since all counted"""
+        self.released = ""
+        """As in HandsFacts"""
+        self.pace = PagePace()
+        """What the pages keep up with"""
         self._up_since_s: float | None = None
         self.doing = Doing.NOBODY_DRIVES
         """Present action of the driving page, as of the last call"""
@@ -95,7 +113,27 @@ class DrivingPage:
     def hands(self, now_s: float) -> PageHands | None:
         """Return the driving page's inputs while they count (running); None otherwise."""
         self._expire(now_s)
-        return self._newest if self.doing is Doing.RUNNING else None
+        passed_s, self._asked_s = now_s - self._asked_s, now_s
+        if self.doing is not Doing.RUNNING or self._newest is None:
+            self._confirmed, self._latest_s = 1.0, 0.0
+            return None
+        age_s = self._newest.age_s + now_s - self._heard_s
+        share = min(1.0, max(0.0, (SILENCE_S - age_s) / (SILENCE_S - IN_FULL_S)))
+        self._confirmed = min(share, self._confirmed + passed_s / _RISE_S)
+        self._latest_s = 0.0 if self._confirmed == 1.0 else max(self._latest_s, age_s)
+        return self._newest
+
+    @property
+    def counts(self) -> float:
+        """Share of the inputs that counts: less while the pictures are old, or the inputs are not confirmed."""
+        return min(self.pictures.hands, self._confirmed)
+
+    @property
+    def because(self) -> str:
+        """Why less than all counts, with what was measured; empty if all counts."""
+        if self._confirmed < self.pictures.hands:
+            return f"this page is late by {1e3 * self._latest_s:.0f} ms"
+        return self.pictures.because
 
     def driven(self, now_s: float) -> bool:
         """Return whether there is a driving page, even if its inputs do not count yet."""
@@ -136,7 +174,8 @@ class DrivingPage:
         """Return the facts for the pages. person: whether they may hand the controls back to a scripted person."""
         self._expire(now_s)
         known = (self.may_drive, self.driver, person, core.tuner.why, core.tuner.link)
-        return HandsFacts(*known, self.pictures.hands, self.reset_first, self.yields, self.pictures.because)
+        pace = self.pace.late_s, self.pace.fewer, self.pace.seldom
+        return HandsFacts(*known, self.counts, self.reset_first, self.yields, self.because, self.released, *pace)
 
     def _take(self, page: int, hands: PageHands, now_s: float) -> None:
         if hands.stop:  # even an overtaken one
@@ -177,7 +216,7 @@ class DrivingPage:
                 if since_s is not None and now_s - since_s >= REST_S:
                     self.doing = Doing.READY
                     self._advance(hands, now_s)
-                elif self.reset_first or not hands.all_up:
+                elif self.reset_first or not hands.all_up or hands.age_s > IN_FULL_S:
                     self._up_since_s = None
                 elif since_s is None:
                     self._up_since_s = now_s
@@ -191,9 +230,17 @@ class DrivingPage:
                     self.rest_anew()
 
     def _expire(self, now_s: float) -> None:
-        if self._driver is not None and now_s - self._heard_s > SILENCE_S:
+        if self._driver is None or self._newest is None:
+            return
+        silent_s = now_s - self._heard_s
+        if silent_s > SILENCE_S:
             self.silences += 1
+            self.released = f"Nothing came from this page for {1e3 * silent_s:.0f} ms."
             self._let_go()
+        elif self.doing is Doing.RUNNING and (late_s := silent_s + self._newest.age_s) > ABSENT_S:
+            self.silences += 1
+            self.released = f"This page was late by {1e3 * late_s:.0f} ms."
+            self.rest_anew()
 
     def _let_go(self) -> None:
         self._driver = self._newest = self._up_since_s = None

@@ -14,12 +14,17 @@ _LARGEST = 2**53 - 1
 
 
 class PageHands(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Inputs at one page; sent at once on any change, and 50 times a second while the page drives or stops the arm."""
+    """Inputs at one page; sent at once on any change, and 50 times a second while the page drives or stops the arm.
+
+    While the page's drawing is late, its worker repeats the last inputs with their age.
+    """
 
     page: Annotated[str, Meta(min_length=1, max_length=32)]
     """Word that identifies the page"""
     number: Annotated[int, Meta(ge=0, le=_LARGEST)]
     """Sequence number of the page's messages"""
+    age_s: Annotated[float, Meta(ge=0.0, le=1e9)] = 0.0
+    """Time since the page's drawing thread confirmed these inputs"""
     driving: bool = False
     """Whether the operator has asked to drive from this page"""
     run: bool = False

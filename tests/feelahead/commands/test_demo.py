@@ -74,19 +74,6 @@ def test_given_flags_are_passed_on_to_the_side_that_takes_them_even_if_default(t
     assert parse_settings(OperatorSettings, "operator", operator).compensation == "robot"
 
 
-@pytest.mark.parametrize(("processors", "shape"), [(2, (320, 240, 15.0)), (4, (640, 480, 30.0))])
-def test_few_processors_get_small_pictures_unless_a_file_says_otherwise(
-    processors: int, shape: tuple[int, int, float], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(run, "usable_processors", lambda: processors)
-    cameras = parse_settings(RobotSettings, "robot", passed_on()[0]).cameras
-    assert (cameras.width, cameras.height, cameras.rate_hz) == shape
-    config = tmp_path / "robot.toml"
-    config.write_text("[cameras]\nwidth = 800\n")
-    cameras = parse_settings(RobotSettings, "robot", passed_on("--robot-config", str(config))[0]).cameras
-    assert (cameras.width, cameras.height, cameras.rate_hz) == (800, 480, 30.0)
-
-
 def test_the_summary_and_the_errors_do_not_depend_on_the_reader(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -122,6 +122,7 @@ class FakeConsole:
         self.pages = 0
         self.address: str | None = None
         self.gone = False
+        self.late_s: float | None = None
         self.notes: list[str] = []
         self.shown: list[OperatorFacts] = []
         self.views: list[tuple[bytes, bool]] = []
@@ -182,6 +183,14 @@ def test_four_times_a_second_it_is_asked_for_and_thirty_times_shown() -> None:
     before, looking.console.pages = len(looking.console.shown), 1
     looking.turns(1.0)
     assert 29 <= len(looking.console.shown) - before <= 31
+
+
+def test_a_late_page_asks_for_fewer_and_smaller_pictures() -> None:
+    looking = Looking()
+    looking.console.pages, looking.console.late_s = 1, 0.4
+    assert looking.turns(10.0)[-1].picture_hz == 5.0
+    looking.console.late_s = 0.01
+    assert (looking.turns(40.0)[-1].picture_hz, looking.turns(1.0)[-1].halved) == (None, False)
 
 
 def test_a_picture_that_is_lacking_is_asked_for_at_once_and_then_four_times_a_second() -> None:

@@ -109,6 +109,20 @@ def test_pictures_give_way_to_a_narrow_link_and_come_back() -> None:
     assert {(frame.width, frame.height) for frame in last} == {(640, 480)}
 
 
+def test_the_slowest_viewer_decides_rate_and_size_of_pictures_and_the_scenes_rate() -> None:
+    table = Table()
+    table.watch(**ALL, picture_hz=10.0, halved=True, scene_hz=5.0)
+    table.run(4.0)
+    assert table.looking.pictures == {"rate_hz": 10.0, "quality": 75, "size": 0.5}
+    views = Counter(frame.view for frame in table.frames())
+    assert all(38 <= count <= 41 for count in views.values())
+    assert 18 <= len(table.states()) <= 21
+    assert {(frame.width, frame.height) for frame in table.frames()} == {(320, 240)}
+    table.watch(**ALL)
+    table.run(3.0)
+    assert table.looking.pictures == {"rate_hz": 30.0, "quality": 75, "size": 1.0}
+
+
 def test_the_same_link_shows_whole_size_in_h264_and_another_codec_begins_where_its_bytes_say() -> None:
     table = Table(left_bit_s=150e3, link=LinkSpec.parse("video: rate 150kbit"))
     table.watch(overview=True, first_person=True, lacks=(0, 0))

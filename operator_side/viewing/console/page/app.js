@@ -9,7 +9,8 @@ import { Clock, View } from "./views.js";
 import { Trigger } from "./triggers.js";
 
 const SILENCE_MS = 400; // facts come 30 times a second
-const RETRY_MS = 500;
+const REFRESH_MS = 100;
+const SELDOM = 10; // refreshes from one drawing of a late page's charts to the next
 const MOST_NOTES = 50;
 const FIGURES = {
   // figures in the bar: id of the element, and title
@@ -38,41 +39,47 @@ const charts = {
   stiffness: new Chart(byId("stiffness_chart"), "stiffness", "", [["L2", "--l2"], ["R2", "--r2", [5, 3]]], 1),
   tick: new Chart(byId("tick_chart"), "robot tick", "µs", [["p50", "--l2"], ["p99", "--r2", [5, 3]]]),
 };
-let socket = null;
+let open = false; // whether the console is connected
+let refreshedMs = performance.now();
 let heardMs = performance.now();
 let everHeard = false;
 let closedBecause = "";
 let facts = null;
+let chartsDue = 0; // refreshes until a late page's charts are drawn
 let drawn = false;
 const frame = document.querySelector("#scene iframe");
 const slow = drawsSlowly();
 let run = { title: "", live: true };
 let ended = ""; // why the connection is expected to end
 
-const send = (object) => {
-  if (socket?.readyState === WebSocket.OPEN) socket.send(JSON.stringify(object));
-};
+const wire = new Worker("wire.js");
+const send = (object) => wire.postMessage(object);
 const hands = new Hands(document, send, () => views[0].capturedS);
 const player = new Player(byId("player"), send);
 
 function connect() {
   const address = new URL("live", location.href);
   address.protocol = "ws:";
-  socket = new WebSocket(address);
-  socket.binaryType = "arraybuffer";
-  socket.onmessage = ({ data }) => {
+  wire.onmessage = ({ data }) => {
     if (typeof data === "string") receive(JSON.parse(data));
-    else views[new DataView(data).getUint8(0)]?.receive(data);
+    else if (data instanceof ArrayBuffer) views[new DataView(data).getUint8(0)]?.receive(data);
+    else {
+      open = data.open;
+      if (open) send({ slow, looks: !document.hidden });
+      else closedBecause = data.reason || "its process has ended, or this page may not see it";
+    }
   };
-  socket.onopen = () => send({ slow, looks: !document.hidden });
-  socket.onclose = ({ reason }) => {
-    closedBecause = reason || "its process has ended, or this page may not see it";
-    setTimeout(connect, RETRY_MS);
-  };
+  wire.postMessage(address.href);
+}
+
+// With the next frame: so the answer's age is the page's lateness, and a late page is sent less.
+function answer() {
+  if (document.hidden) send({ taken: true });
+  else requestAnimationFrame(() => send({ taken: true }));
 }
 
 function receive(message) {
-  if (message.kind === ShownKind.END) send({ taken: true });
+  if (message.kind === ShownKind.END) answer();
   else if (message.kind === ShownKind.FACTS) showFacts(message);
   else if (message.kind === ShownKind.SCENE) showScene(message);
   else if (message.kind === ShownKind.NOTE) showNote(message.text);
@@ -151,7 +158,8 @@ function showLink(status) {
   const rate = status.rate_kbit_s == null ? "?" : `${figure(status.rate_kbit_s / 1000, 1)} Mbit/s`;
   text("rate", `${rate} / ${figure(status.queue_ms)} ms / ${figure(status.lost_percent, 1)} %`, status.queue_ms > 50);
   const held = status.held_back ? `; held back: ${status.held_back}` : "";
-  text("pictures", `${status.pictures ?? "?"}${held}`);
+  const late = facts.page?.fewer ? `; fewer, as the page is late by ${figure(1000 * facts.page.late_s)} ms` : "";
+  text("pictures", `${status.pictures ?? "?"}${held}${late}`);
 }
 
 byId("again").onclick = () => {
@@ -217,8 +225,10 @@ function showNote(note) {
 }
 
 function refresh() {
-  const silentMs = performance.now() - heardMs;
-  const open = socket?.readyState === WebSocket.OPEN;
+  const nowMs = performance.now();
+  heardMs = Math.min(nowMs, heardMs + Math.max(0, nowMs - refreshedMs - REFRESH_MS)); // something may have come that this page has not taken yet
+  refreshedMs = nowMs;
+  const silentMs = nowMs - heardMs;
   const lost = !open || ((run.live || !everHeard) && silentMs > SILENCE_MS);
   byId("lost").hidden = !lost;
   if (lost) {
@@ -231,7 +241,15 @@ function refresh() {
   views.forEach((view, k) => view.showAge(limits?.states[k] ?? null, limits?.old_s[k] ?? null));
 }
 
+// A late page draws its charts seldom.
+function drawCharts() {
+  chartsDue -= 1;
+  if (chartsDue > 0 && facts?.page?.seldom) return;
+  chartsDue = SELDOM;
+  Object.values(charts).forEach((chart) => chart.draw(clock.nowMs));
+}
+
 document.addEventListener("visibilitychange", () => send({ looks: !document.hidden }));
 connect();
-setInterval(refresh, 100);
-setInterval(() => Object.values(charts).forEach((chart) => chart.draw(clock.nowMs)), 100);
+setInterval(refresh, REFRESH_MS);
+setInterval(drawCharts, REFRESH_MS);

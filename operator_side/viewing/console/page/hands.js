@@ -13,7 +13,7 @@ import { Tuning } from "./tuning.js";
 
 const PERIOD_MS = 20;
 const REST_MS = 1000;
-const HELD_UP_MS = 150; // a page that was suspended for longer releases all inputs; the operator side does the same
+const HELD_UP_MS = 1000; // a page that was late by more releases all inputs; the operator side does the same
 const SILENCE_MS = 500; // without facts for longer the arm's state is unknown
 const AGREES_MS = 500; // time until the facts reflect our messages
 const STOP_MS = 200;
@@ -28,7 +28,6 @@ export class Hands {
   #keys = new Keys();
   #grips = new Grips(() => this.#step());
   #page = crypto.getRandomValues(new Uint32Array(2)).join("-");
-  #number = 0;
   #state = "watching";
   #sinceMs = 0; // start of this state
   #drivingSinceMs = null;
@@ -222,7 +221,8 @@ export class Hands {
     this.#markNow(there ? pads.mark : null);
     this.#panel.showGamepad(pads, there);
     if (this.#state !== "watching") {
-      if (passedMs > HELD_UP_MS) this.#release("This page was suspended.");
+      this.#factsMs = Math.min(nowMs, this.#factsMs + Math.max(0, passedMs - PERIOD_MS)); // facts may have come that this page has not taken yet
+      if (passedMs > HELD_UP_MS) this.#release(`This page was late by ${passedMs.toFixed(0)} ms.`);
       if (nowMs - this.#factsMs > SILENCE_MS) this.#release("Nothing is heard from the operator side.");
     }
     const moves = this.#state === "running" && this.#moves;
@@ -257,11 +257,11 @@ export class Hands {
     else if (known.driver !== null && known.driver !== this.#page && nowMs - this.#drivingSinceMs > AGREES_MS)
       this.#end("Another page drives.");
     else if (this.#facts.status.person === Doing.ALL_KEYS_UP_FIRST && this.#state !== "resting" && nowMs - this.#sinceMs > AGREES_MS) {
-      this.#enter("resting", this.#armed ? "" : "The arm was disarmed or stopped.");
+      this.#enter("resting", this.#armed ? known.released : "The arm was disarmed or stopped.");
     }
   }
 
-  // Send at once on any change, and 50 times a second while we drive or stop.
+  // Send at once on any change, and 50 times a second while we drive or stop; wire.js numbers it.
   #say(hands) {
     const stop = this.#stops;
     const driving = this.#state !== "watching";
@@ -273,7 +273,7 @@ export class Hands {
     if (this.#sent === "" && !driving && !stop && !this.#reset && !this.#giveBack) return; // nothing to send yet
     this.#sent = text;
     this.#sentMs = nowMs;
-    this.#send({ hands: { page: this.#page, number: this.#number++, shown_s: this.#shownS(), ...said } });
+    this.#send({ hands: { page: this.#page, shown_s: this.#shownS(), ...said } });
   }
 
   #draw() {

@@ -118,7 +118,7 @@ def test_silence_releases_everything() -> None:
     desk.arm()
     desk.let_pass(0.02, run=True, r2=1.0, lateral=(1.0, 0.0))
     after = desk.let_pass(1.0, says=False)
-    assert {(one.r2, one.lateral, one.run) for one in after[round(0.16 / TICK_S) :]} == {(0.0, (0.0, 0.0), False)}
+    assert {(one.r2, one.lateral, one.run) for one in after[round(0.31 / TICK_S) :]} == {(0.0, (0.0, 0.0), False)}
     assert after[round(0.1 / TICK_S)].run
 
 

@@ -175,7 +175,7 @@ segments = st.lists(
         st.sampled_from([*KINDS, "rest", "rest", "run", "pull", "silence", "garbage", "close", "replay"]),
         st.sampled_from([1, 1, 1, 2]),
         st.integers(1, 60),
-        st.sampled_from([PERIOD_S, 0.004, 0.1, SILENCE_S, 0.16]),
+        st.sampled_from([PERIOD_S, 0.004, 0.1, SILENCE_S, 0.31]),
     ),
     max_size=12,
 )
@@ -183,7 +183,7 @@ segments = st.lists(
 
 @settings(max_examples=300, deadline=None)
 @example([("rest", 1, 55, PERIOD_S), ("pull", 1, 5, PERIOD_S), ("stop", 2, 1, PERIOD_S), ("pull", 1, 60, PERIOD_S)])
-@example([("rest", 1, 55, PERIOD_S), ("pull", 1, 1, PERIOD_S), ("silence", 1, 1, 0.16), ("pull", 1, 60, PERIOD_S)])
+@example([("rest", 1, 55, PERIOD_S), ("pull", 1, 1, PERIOD_S), ("silence", 1, 1, 0.31), ("pull", 1, 60, PERIOD_S)])
 @example([("rest", 1, 55, PERIOD_S), ("rest", 2, 55, PERIOD_S), ("pull", 1, 9, PERIOD_S), ("pull", 2, 9, PERIOD_S)])
 @given(segments)
 def test_hands_count_only_while_fresh_and_after_a_second_of_rest(script: list[tuple[str, int, int, float]]) -> None:
@@ -232,6 +232,48 @@ def judge(pages: DrivingPage, heard: list[Heard], now_s: float) -> None:
     assert all(after.now_s - before.now_s <= SILENCE_S for before, after in pairwise(ours[rested:]))
     assert ours[began].now_s - ours[rested].now_s >= REST_S
     assert not any(one.hands.stop for one in heard if one.now_s > ours[began].now_s - REST_S)
+
+
+def test_unconfirmed_inputs_count_less_and_less_then_nothing_and_after_a_second_all_keys_are_up_first(
+    pages: DrivingPage,
+) -> None:
+    """The worker of a page whose drawing is late repeats inputs. Once it draws again, they return in half a second."""
+    page = TalkingPage(pages)
+    start_s = running(pages, page)
+    travel_s, shares = 0.0, {}
+    for step in range(1, 91):
+        age_s = 0.01 * step
+        page.say(start_s + age_s, run=True, r2=1.0, age_s=age_s)
+        assert pages.hands(start_s + age_s) is not None
+        shares[step] = pages.counts
+        travel_s += 0.01 * pages.counts
+    assert (shares[15], shares[30], shares[90]) == pytest.approx((1.0, 0.0, 0.0))
+    assert shares[22] == pytest.approx(0.08 / 0.15)
+    assert travel_s == pytest.approx(0.225, abs=0.01)
+    page.say(start_s + 0.92, run=True, r2=1.0)
+    pages.hands(start_s + 0.92)
+    assert 0.0 < pages.counts < 0.1
+    assert pages.because == "this page is late by 900 ms"
+    now_s = page.go_on(start_s + 0.94, 0.5, run=True)
+    pages.hands(now_s)
+    assert (pages.counts, pages.because) == (1.0, "")
+    page.say(now_s, run=True, age_s=1.01)
+    assert pages.hands(now_s) is None
+    assert (pages.doing, pages.released) == (Doing.ALL_KEYS_UP_FIRST, "This page was late by 1010 ms.")
+    # What is not confirmed is no rest.
+    page.go_on(now_s, 1.5, age_s=0.2)
+    assert pages.doing is Doing.ALL_KEYS_UP_FIRST
+
+
+def test_a_silent_page_moves_ever_less_until_nobody_drives_which_is_said_with_the_time(pages: DrivingPage) -> None:
+    start_s = running(pages, TalkingPage(pages))
+    shares = []
+    for age_s in (0.1, 0.225, 0.299):
+        assert pages.hands(start_s + age_s) is not None
+        shares.append(pages.counts)
+    assert shares == pytest.approx([1.0, 0.5, 0.0], abs=0.01)
+    assert pages.hands(start_s + 0.31) is None
+    assert (pages.driver, pages.released) == (None, "Nothing came from this page for 310 ms.")
 
 
 def test_any_page_marks_episodes() -> None:
