@@ -23,8 +23,8 @@ if TYPE_CHECKING:
     from robot_side.viewing.h264 import H264
     from robot_side.viewing.rendering import Renderer
 
-_NICENESS = 5
-"""Niceness of this process: behind a browser on the same machine, so that pictures give way to keys"""
+_NICENESS = 0
+"""Niceness of this process: an ordinary program's, not the sides', which would put pictures before the browser"""
 
 
 def main() -> None:

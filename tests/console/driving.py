@@ -33,7 +33,10 @@ _CLOSE_MM: Final = 20.0
 """Way of the target's middle behind the gripper's point at which the fingers close"""
 _LIFT_MM, _BACK_MM, _GENTLE_MM = 60.0, 60.0, 30.0
 _LOST_S: Final = 30.0
-COLUMNS: Final = ("delay_ms", "seed", "grasped", "placed", "time_s", "contacts", "amber", "dead", "stops", "end")
+COLUMNS: Final = (
+    *("delay_ms", "seed", "grasped", "placed", "time_s", "contacts", "amber", "dead"),
+    *("changes", "pictures_hz", "drops", "unarmed", "stops", "end"),
+)
 _SEEN: Final = """() => {
     const text = (selector) => document.querySelector(selector)?.textContent ?? '';
     const rows = [...document.querySelectorAll('.near dt')].map((dt) => [dt.textContent, dt.nextSibling.textContent]);
@@ -41,6 +44,7 @@ _SEEN: Final = """() => {
         rows: Object.fromEntries(rows), state: document.body.dataset.state, hands: text('#hands_state'),
         delay: text('#delay'), r2: text('#r2 .yields'), off: !document.querySelector('#hands_off').hidden,
         ages: [...document.querySelectorAll('.view')].map((view) => view.dataset.age),
+        frames: Number(document.querySelector('.view').dataset.frames ?? 0),
     };
 }"""
 _DRIVES_OR_LATE: Final = "/You drive|All keys up/.test(document.querySelector('#hands_state')?.textContent)"
@@ -59,8 +63,12 @@ class Hand:
         self._held: set[str] = set()
         self._level = 4
         self.began_s = time.monotonic()
-        self.looks = self.amber = self.dead = 0
-        """Number of looks at the page; and of these, with an old picture, and with a dead view"""
+        self.looks = self.amber = self.dead = self.changes = 0
+        """Number of looks at the page; and of these, with an old picture, a dead view, another state than before"""
+        self.drops = self.unarmed = 0
+        """Number of times that keys were released without the hand's doing, and of attempts to arm that failed"""
+        self._newest: dict[str, Any] | None = None
+        self._first_frames = 0
 
     def look(self) -> dict[str, Any]:
         """Take in what the page shows; return what it showed a reaction ago. OutOfTimeError at the time limit."""
@@ -72,11 +80,14 @@ class Hand:
         self.looks += 1
         self.amber += "old" in seen["ages"]
         self.dead += "dead" in seen["ages"]
+        self.changes += self._newest is not None and self._newest["ages"] != seen["ages"]
+        self._newest = seen
         self._seen.append((now_s, seen))
         while len(self._seen) > 1 and self._seen[1][0] <= now_s - _REACTION_S:
             self._seen.popleft()
         known = self._seen[0][1]
         if "run" in self._held and ("All keys up" in known["hands"] or known["state"] in ("disarmed", "stopped")):
+            self.drops += 1
             self.arm()
             return self.look()
         return known
@@ -98,8 +109,19 @@ class Hand:
             keyboard.down("Space")
             self._page.wait(_DRIVES_OR_LATE, "'You drive' or 'All keys up' in #hands_state", _LOST_S)
             drives = "You drive" in self._page.ask(_SEEN)["hands"]
+            self.unarmed += not drives
         self._seen.clear()
         self._held.add("run")
+
+    def begin(self) -> None:
+        """Count time and pictures from now on."""
+        self.began_s, self._first_frames = time.monotonic(), int(self._page.ask(_SEEN)["frames"])
+
+    @property
+    def pictures_hz(self) -> float:
+        """Number of pictures of the first view that were shown in a second"""
+        frames = 0 if self._newest is None else self._newest["frames"] - self._first_frames
+        return float(frames / (time.monotonic() - self.began_s))
 
     def release(self) -> None:
         for key in self._held - {"run"}:
@@ -232,7 +254,7 @@ def drive(page: Page) -> tuple[Hand, str]:
         page.raw.click("#drive")
         page.wait("document.querySelector('.near dt') !== null", "figures beside the gripper", 60.0)
         hand.arm()
-        hand.began_s = time.monotonic()
+        hand.begin()
         hand.look()
         for _ in range(3):
             approach(hand)
@@ -265,7 +287,7 @@ def run_once(one: Browser, delay_ms: float, seed: int, given: Sequence[str]) -> 
             one.page(run.address) as page,
         ):
             hand, end = drive(page)
-            took_s = time.monotonic() - hand.began_s
+            took_s, pictures_hz = time.monotonic() - hand.began_s, hand.pictures_hz
         truth = json.loads(summary.read_text())
     task = truth["task"]
     return {
@@ -277,6 +299,10 @@ def run_once(one: Browser, delay_ms: float, seed: int, given: Sequence[str]) -> 
         "contacts": task["obstacle_contacts"],
         "amber": round(hand.amber / max(hand.looks, 1), 3),
         "dead": round(hand.dead / max(hand.looks, 1), 3),
+        "changes": hand.changes,
+        "pictures_hz": round(pictures_hz, 1),
+        "drops": hand.drops,
+        "unarmed": hand.unarmed,
         "stops": len(truth["stops"]),
         "end": end,
     }

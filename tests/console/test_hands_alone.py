@@ -121,7 +121,7 @@ def _parts(value: object) -> tuple[float, ...]:
 
 def _freeze(alone: HandsAlone) -> None:
     alone.hears = False
-    alone.let_pass(0.2)
+    alone.let_pass(0.35)
     alone.hears = True
 
 
@@ -148,7 +148,7 @@ def test_whatever_takes_the_keys_lets_go(browser: Browser, end: Callable[[HandsA
         alone.let_pass(0.5)
         assert alone.pulled[1] > 0.2
         end(alone)
-        alone.let_pass(0.06 if alone.hears else 0.2)
+        alone.let_pass(0.06 if alone.hears else 0.35)
         assert (alone.pulled, alone.runs) == ((0.0, 0.0), False)
         alone.let_pass(0.3)
         assert not alone.runs, "keys that stayed down were taken for new ones"

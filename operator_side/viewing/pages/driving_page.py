@@ -222,7 +222,7 @@ class DrivingPage:
                     self._up_since_s = now_s
             case Doing.READY:
                 if hands.run and not hands.stop:
-                    self.doing = Doing.RUNNING
+                    self.doing, self.released = Doing.RUNNING, ""
                 elif not hands.all_up:
                     self.rest_anew()
             case Doing.RUNNING:
