@@ -75,10 +75,8 @@ class HandsFacts(msgspec.Struct, frozen=True):
     """Why less than all of a page's motion counts, with what was measured; empty if all counts"""
     released: str = ""
     """Why a page's inputs were last released without its doing, with what was measured; empty if they never were"""
-    late_s: float | None = None
-    """Age of the pages' answers; None if no page is visible"""
-    fewer: bool = False
-    """Whether pictures are fewer or smaller because a page was late"""
+    fewer: str = ""
+    """Why pictures are fewer or smaller than the settings say, with what was measured; empty if they are not"""
     seldom: bool = False
     """Whether the scene and the charts are drawn less often, too"""
 

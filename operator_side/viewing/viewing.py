@@ -131,7 +131,7 @@ class Viewing:
 
     def _hear(self, console: Console, now_s: float) -> None:
         console.receive(now_s)
-        self._pages.pace.update(console.late_s, now_s)
+        self._pages.pace.update(console.late, now_s)
         while console.words:
             page, said = console.words.popleft()
             if said is None:

@@ -68,8 +68,8 @@ ARROWS = """
     robot_side/core: common common/protocol common/status common/timing robot_side/arm robot_side/gripper
         robot_side/laws robot_side/operators robot_side/outcome robot_side/reporting robot_side/surroundings
         robot_side/tick
-    robot_side/viewing: common common/companion common/protocol robot_side/drivers/mujoco robot_side/operators
-        robot_side/surroundings robot_side/tick
+    robot_side/viewing: common common/companion common/protocol common/realtime robot_side/drivers/mujoco
+        robot_side/operators robot_side/surroundings robot_side/tick
     robot_side/settings.py: common common/command robot_side/arm robot_side/drivers/mujoco robot_side/enlargement
         robot_side/laws/named.py robot_side/operators robot_side/viewing
     robot_side/parts.py: common common/protocol common/timing robot_side/arm robot_side/compiled robot_side/core
@@ -106,8 +106,8 @@ ARROWS = """
         operator_side/viewing/facts.py
     operator_side/viewing/pages: common common/protocol common/status operator_side/controller operator_side/core.py
         operator_side/dualsense/simulated operator_side/hands operator_side/people operator_side/viewing/facts.py
-    operator_side/viewing/console: common common/command common/companion common/protocol common/status common/video
-        operator_side/controller operator_side/viewing/facts.py
+    operator_side/viewing/console: common common/command common/companion common/protocol common/realtime common/status
+        common/video operator_side/controller operator_side/viewing/facts.py
     operator_side/viewing: common common/command common/protocol common/rate common/recording common/status
         operator_side/controller operator_side/core.py operator_side/settings.py operator_side/viewing/console
         operator_side/viewing/facts.py operator_side/viewing/pages

@@ -5,7 +5,7 @@ Each message on the channel begins with a letter:
 operator side ──▶ here    o, first, the port and the token, f facts, v a view payload as received, n a note,
                           r the constants of a run, p the position in a recording, d the run's normal end
 here ──▶ operator side    a the address, w the number of visible pages, s a page's message, e why there is no console,
-                          t how late the pages' answers are, in seconds, while a page is visible,
+                          t how late the pages' answers are, and the share of pictures that they skip,
                           l the H.264 pictures that are lacking: first once H.264 can be shown, then at each change
 """
 
@@ -133,8 +133,8 @@ class _Process:
         loop.add_reader(self._channel.fileno(), self._receive)
 
     def _tell_lateness(self, loop: Any) -> None:
-        if (late_s := self._pages.late_s(loop.time())) is not None:
-            self._say("t", msgspec.msgpack.encode(late_s))
+        if (late := self._pages.late(loop.time())) is not None:
+            self._say("t", msgspec.msgpack.encode(late))
         loop.call_later(_LATENESS_PERIOD_S, self._tell_lateness, loop)
 
     def _follow(self, steps: Any) -> None:

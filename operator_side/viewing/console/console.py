@@ -52,8 +52,8 @@ class Console:
         """Number of visible pages; with 0, nothing need be sent or rendered."""
         self.lacks: tuple[int, int] | None = None
         """As `lacks` in `Watch`; None until the console can show H.264 pictures."""
-        self.late_s: float | None = None
-        """How late the pages' answers are, in seconds; None if no page is visible."""
+        self.late: tuple[float, float] | None = None
+        """How late the pages' answers are, in seconds, and the share of pictures skipped; None without a page."""
         self.came = 0
         """Number of times that a page was opened or shown again."""
         self.words: deque[PageWords] = deque(maxlen=_MOST_HEARD)
@@ -128,9 +128,9 @@ class Console:
             elif kind == b"w":
                 before, self.pages = self.pages, int(content)
                 self.came += self.pages > before
-                self.late_s = self.late_s if self.pages else None
+                self.late = self.late if self.pages else None
             elif kind == b"t":
-                self.late_s = msgspec.msgpack.decode(content, type=float)
+                self.late = msgspec.msgpack.decode(content, type=tuple[float, float])
             elif kind == b"l":
                 self.lacks = msgspec.msgpack.decode(content, type=tuple[int, int])
             elif kind == b"e":
@@ -169,7 +169,7 @@ class Console:
     def _end(self, why: str, *, for_good: bool) -> None:
         """Note the end of the console process: report every page that sent hands as closed."""
         self._runs, self.gone = False, for_good
-        self.address, self.pages, self.lacks, self.late_s = None, 0, None, None
+        self.address, self.pages, self.lacks, self.late = None, 0, None, None
         for page in sorted(self._handling):
             self._hear(page, None)
         self._notes.append(why)

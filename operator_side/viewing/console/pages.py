@@ -11,6 +11,7 @@ import msgspec
 from websockets.asyncio.server import ServerConnection
 from websockets.exceptions import ConnectionClosed
 
+from common.protocol.view_messages import VIEW_NAMES
 from operator_side.viewing.facts import ShownKind
 
 MOST_PAGES: Final = 8
@@ -68,6 +69,15 @@ class _Page:
         """Time of the newest batch; None once it is answered"""
         self._ages_s: deque[tuple[float, float]] = deque(maxlen=_MOST_AGES)
         """Times and ages of the newest answers"""
+        self._pictures: deque[tuple[float, bool]] = deque(maxlen=_MOST_AGES)
+        """Times of the newest pictures, and whether each replaced one that was not sent yet"""
+
+    def queue(self, kind: str, message: bytes | str, now_s: float) -> None:
+        """Queue a message, in place of an unsent one of the same kind."""
+        if kind in VIEW_NAMES:
+            self._pictures.append((now_s, kind in self.newest))
+        self.newest[kind] = message
+        self.something.set()
 
     def answered(self, now_s: float) -> None:
         """Note an answer to the newest batch."""
@@ -76,12 +86,17 @@ class _Page:
         self._asked_s = None
         self.taken.set()
 
-    def late_s(self, now_s: float) -> float | None:
-        """Return the age of answers, in seconds, that one in ten of the last second exceeds; None without any."""
+    def late(self, now_s: float) -> tuple[float, float] | None:
+        """Return the age of answers, in seconds, that one in ten of the last second exceeds, and the share of pictures
+        skipped; None without an answer.
+        """
         ages_s = [age_s for at_s, age_s in self._ages_s if now_s - at_s < _RECENT_S]
         if self._asked_s is not None:
             ages_s.append(now_s - self._asked_s)
-        return sorted(ages_s)[math.ceil(_TAIL * len(ages_s)) - 1] if ages_s else None
+        if not ages_s:
+            return None
+        skipped = [skipped for at_s, skipped in self._pictures if now_s - at_s < _RECENT_S]
+        return sorted(ages_s)[math.ceil(_TAIL * len(ages_s)) - 1], sum(skipped) / max(len(skipped), 1)
 
     async def send(self, connection: ServerConnection) -> None:
         with contextlib.suppress(ConnectionClosed):  # `_listen` notices it, too
@@ -113,10 +128,14 @@ class Pages:
         """Whether any page draws the scene slowly."""
         return any(page.slow for page in self._pages.values())
 
-    def late_s(self, now_s: float) -> float | None:
-        """Return how late the visible pages' answers are, in seconds, by the latest page; None without any."""
-        known_s = (page.late_s(now_s) for page in self._pages.values() if page.looks)
-        return max((late_s for late_s in known_s if late_s is not None), default=None)
+    def late(self, now_s: float) -> tuple[float, float] | None:
+        """Return how late the visible pages' answers are, in seconds, and the share of pictures that they skip.
+
+        Both are of the page that has the greatest; None without an answer.
+        """
+        pages = (page.late(now_s) for page in self._pages.values() if page.looks)
+        known = [late for late in pages if late is not None]
+        return (max(late_s for late_s, _ in known), max(skips for _, skips in known)) if known else None
 
     def show(self, kind: str, message: bytes | str, *, lasting: bool = False) -> None:
         """Queue a message for the visible pages; it replaces an unsent one of the same kind.
@@ -126,10 +145,10 @@ class Pages:
         if lasting:
             self._lasting.pop(kind, None)  # the newest comes last
             self._lasting[kind] = message
+        now_s = asyncio.get_running_loop().time()
         for page in self._pages.values():
             if page.looks or lasting:
-                page.newest[kind] = message
-                page.something.set()
+                page.queue(kind, message, now_s)
 
     def note(self, message: str) -> None:
         """Send a note to every page, also to those that open later."""

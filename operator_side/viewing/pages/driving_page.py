@@ -174,7 +174,7 @@ class DrivingPage:
         """Return the facts for the pages. person: whether they may hand the controls back to a scripted person."""
         self._expire(now_s)
         known = (self.may_drive, self.driver, person, core.tuner.why, core.tuner.link)
-        pace = self.pace.late_s, self.pace.fewer, self.pace.seldom
+        pace = self.pace.because, self.pace.seldom
         return HandsFacts(*known, self.counts, self.reset_first, self.yields, self.because, self.released, *pace)
 
     def _take(self, page: int, hands: PageHands, now_s: float) -> None:

@@ -1,4 +1,4 @@
-"""Rate and size of the pictures, and rate of the scene, that a page keeps up with, by how late its answers are."""
+"""Rates of the pictures and the scene that a page keeps up with, by how late it is and what it skips."""
 
 import math
 from typing import Final, NamedTuple
@@ -26,9 +26,11 @@ _PACES: Final = (
 """Paces from the fastest to the slowest: first the pictures give way, then the scene and the charts"""
 _BEGINS: Final = 3
 """Index of the first pace: pictures that two slow processors draw, code and show beside both sides"""
-_LATE_S, _EARLY_S = 0.12, 0.06
+_LATE_S, _EARLY_S = 0.2, 0.1
 """Lateness above which a slower pace is taken, and below which a faster one may be"""
-_DOWN_S: Final = 0.5
+_SKIPS, _TAKES = 0.3, 0.1
+"""Share of the pictures that a page skips above which a slower pace is taken, and below which a faster one may be"""
+_DOWN_S: Final = 1.0
 _EAGER_S, _PATIENCE_S, _MOST_PATIENCE_S = 0.5, 4.0, 60.0
 """Time, in seconds, before a faster pace is taken: while the page was never late; afterwards; and at most, as it
 doubles each time that a faster pace made the page late"""
@@ -38,8 +40,7 @@ class PagePace:
     """Choice of the pace: slower soon, faster after a while in which the page was early."""
 
     def __init__(self) -> None:
-        self.late_s: float | None = None
-        """Newest lateness; None while unknown"""
+        self._because = ""
         self._at = _BEGINS
         self._patience_s = _EAGER_S
         self._changed_s = self._early_since_s = -math.inf
@@ -52,21 +53,28 @@ class PagePace:
         return _PACES[self._at]
 
     @property
-    def fewer(self) -> bool:
-        """Whether pictures are fewer or smaller because the page was late."""
-        return self._at > 0 and self._patience_s > _EAGER_S
+    def because(self) -> str:
+        """Why pictures are fewer or smaller, with what was measured; empty if they are not, or a run has just begun."""
+        return self._because if self._at > 0 else ""
 
     @property
     def seldom(self) -> bool:
         """Whether the scene, and the page's charts, are drawn less often, too."""
         return self.now.scene_hz is not None
 
-    def update(self, late_s: float | None, now_s: float) -> None:
-        """Take in how late the pages' answers are at `now_s`, in seconds; None if no page is visible."""
-        self.late_s = late_s
-        if late_s is None or late_s > _EARLY_S:
+    def update(self, late: tuple[float, float] | None, now_s: float) -> None:
+        """Take in how late the pages' answers are, in seconds, and the share of the pictures that they skip.
+
+        None if no page is visible.
+        """
+        late_s, skips = (0.0, 0.0) if late is None else late
+        if late is None or late_s > _EARLY_S or skips > _TAKES:
             self._early_since_s = now_s
-        if late_s is not None and late_s > _LATE_S and now_s - self._changed_s >= _DOWN_S:
+        # A page that skips pictures is not late for it: the scene is not slowed.
+        skipping = skips > _SKIPS and _PACES[min(self._at + 1, len(_PACES) - 1)].scene_hz is None
+        if (late_s > _LATE_S or skipping) and now_s - self._changed_s >= _DOWN_S:
+            late_words = f"the page was late by {1e3 * late_s:.0f} ms"
+            self._because = late_words if late_s > _LATE_S else f"the page skipped {100 * skips:.0f} % of them"
             in_vain = self._rose and now_s - self._changed_s < 2.0 * self._patience_s
             doubled_s = 2.0 * self._patience_s if in_vain else self._patience_s
             self._patience_s = min(_MOST_PATIENCE_S, max(_PATIENCE_S, doubled_s))

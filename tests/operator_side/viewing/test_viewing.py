@@ -122,7 +122,7 @@ class FakeConsole:
         self.pages = 0
         self.address: str | None = None
         self.gone = False
-        self.late_s: float | None = None
+        self.late: tuple[float, float] | None = None
         self.notes: list[str] = []
         self.shown: list[OperatorFacts] = []
         self.views: list[tuple[bytes, bool]] = []
@@ -187,9 +187,9 @@ def test_four_times_a_second_it_is_asked_for_and_thirty_times_shown() -> None:
 
 def test_a_late_page_asks_for_fewer_and_smaller_pictures() -> None:
     looking = Looking()
-    looking.console.pages, looking.console.late_s = 1, 0.4
+    looking.console.pages, looking.console.late = 1, (0.4, 0.0)
     assert looking.turns(10.0)[-1].picture_hz == 5.0
-    looking.console.late_s = 0.01
+    looking.console.late = 0.01, 0.0
     assert (looking.turns(40.0)[-1].picture_hz, looking.turns(1.0)[-1].halved) == (None, False)
 
 

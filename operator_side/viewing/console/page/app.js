@@ -158,7 +158,7 @@ function showLink(status) {
   const rate = status.rate_kbit_s == null ? "?" : `${figure(status.rate_kbit_s / 1000, 1)} Mbit/s`;
   text("rate", `${rate} / ${figure(status.queue_ms)} ms / ${figure(status.lost_percent, 1)} %`, status.queue_ms > 50);
   const held = status.held_back ? `; held back: ${status.held_back}` : "";
-  const late = facts.page?.fewer ? `; fewer, as the page is late by ${figure(1000 * facts.page.late_s)} ms` : "";
+  const late = facts.page?.fewer ? `; fewer, as ${facts.page.fewer}` : "";
   text("pictures", `${status.pictures ?? "?"}${held}${late}`);
 }
 

@@ -195,19 +195,25 @@ def test_a_hidden_page_counts_for_nothing_and_is_shown_nothing_but_what_lasts() 
     assert run(story).counts == [1, 2, 1, 2, 1, 0]
 
 
-def test_the_age_of_answers_is_the_lateness_of_the_pages_that_are_visible() -> None:
+def test_a_visible_page_is_late_by_the_age_of_its_answers_and_what_it_skips_is_counted() -> None:
     async def story(desk: Desk, opens: Opens) -> None:
         now_s = asyncio.get_running_loop().time
         async with opens() as page:
-            assert desk.pages.late_s(now_s()) is None
+            assert desk.pages.late(now_s()) is None
             desk.pages.show("facts", "0")
             await a_round(page)
-            asked_s = now_s()
-            assert 29.0 < (desk.pages.late_s(asked_s + 30.0) or 0.0) < 31.0  # not answered yet
+            for number in range(10):
+                desk.pages.show("overview", b"%d" % number)
+            late_s, skips = desk.pages.late(now_s()) or (0.0, 0.0)
+            assert skips == pytest.approx(0.9)
+            late_s, _ = desk.pages.late(now_s() + 30.0) or (0.0, 0.0)
+            assert 30.0 <= late_s < 60.0  # not answered yet
             await page.send(TAKEN)
-            await desk.until(lambda: desk.pages.late_s(now_s() + 30.0) is None)
+            await a_round(page)
+            await page.send(TAKEN)
+            await desk.until(lambda: desk.pages.late(now_s() + 30.0) is None)
             await page.send('{"looks":false}')
             await desk.until(lambda: desk.counts[-1] == 0)
-            assert desk.pages.late_s(now_s()) is None
+            assert desk.pages.late(now_s()) is None
 
     run(story)
