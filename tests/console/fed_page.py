@@ -1,6 +1,7 @@
 """Console that a thread feeds with facts and pictures in a test's hands: no robot side takes part."""
 
 import threading
+from collections import deque
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -37,6 +38,8 @@ class Fed:
     page: HandsFacts = field(default_factory=lambda: HandsFacts(True, "page", False, "", None, yields=(False, True)))
     """Facts for the page; a page that asks to drive is the driver"""
     pictures: PictureFacts = FRESH
+    hands: deque[dict[str, Any]] = field(default_factory=lambda: deque(maxlen=1000))
+    """Inputs that pages have sent, newest last"""
     notes: list[str] = field(default_factory=list)
     address: str | None = None
     ends: threading.Event = field(default_factory=threading.Event)
@@ -49,6 +52,7 @@ class Fed:
                 self.address, now_s, step = console.address, clock.now(), step + 1
                 for _, said in console.words:
                     if said is not None and "hands" in said:
+                        self.hands.append(said["hands"])
                         driver = said["hands"]["page"] if said["hands"]["driving"] else ""
                 console.words.clear()
                 made = facts(now_s, self.state)

@@ -1,12 +1,16 @@
 """Amber, dead, hands off, stop and reset, as the page shows them: the operator side's facts are given."""
 
+from itertools import pairwise
+
 import msgspec
 import pytest
 
+from common.status.codes import Doing
 from operator_side.viewing.facts import PictureState
 from tests.console.browser import Browser
 from tests.console.fed_page import AGE, FRESH, fed_page
 from tests.console.hands_alone import hands_alone
+from tests.helpers.machines.waiting import wait_until
 
 pytestmark = [pytest.mark.console, pytest.mark.processes]
 
@@ -37,6 +41,25 @@ def test_the_border_says_that_hands_are_off_until_they_count_again(browser: Brow
         page.picture("hands-off")
         fed.page = msgspec.structs.replace(fed.page, counts=1.0)
         page.wait("document.querySelector('#hands_off').hidden", "hands that count")
+
+
+def test_a_page_whose_drawing_is_late_is_heard_by_its_worker_and_says_how_late_it_was(browser: Browser) -> None:
+    blocked = "() => { const end = performance.now() + 2000; while (performance.now() < end); }"
+    with fed_page(browser) as (fed, page):
+        fed.page = msgspec.structs.replace(fed.page, driver=None)
+        fed.state, fed.status = "disarmed", {"person": Doing.READY}
+        page.raw.click("#drive")
+        page.wait_for_text("#hands_state", "Ready")
+        with page.held("Space"):
+            wait_until("hold-to-run", lambda: fed.hands[-1]["run"])
+            fed.hands.clear()
+            page.ask(blocked)
+            page.wait_for_text("#hands_state", "This page was late by")
+            wait_until("a release", lambda: not fed.hands[-1]["run"])
+        repeated = [one for one in fed.hands if one["age_s"] > 0.3]
+        assert repeated
+        assert all(one["run"] for one in repeated)
+        assert all(before["number"] < after["number"] for before, after in pairwise(fed.hands))
 
 
 def test_after_a_stop_only_the_reset_lets_hold_to_run_count(browser: Browser) -> None:
