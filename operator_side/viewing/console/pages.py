@@ -105,9 +105,9 @@ class _Page:
                 self.something.clear()
                 self.taken.clear()
                 this_round, self.newest = self.newest, {}
+                self._asked_s = asyncio.get_running_loop().time()
                 for message in (*this_round.values(), ROUND_ENDS):
                     await connection.send(message)
-                self._asked_s = asyncio.get_running_loop().time()
                 await self.taken.wait()
 
 
