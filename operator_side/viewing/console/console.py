@@ -53,7 +53,7 @@ class Console:
         self.lacks: tuple[int, int] | None = None
         """As `lacks` in `Watch`; None until the console can show H.264 pictures."""
         self.late: tuple[float, float] | None = None
-        """How late the pages' answers are, in seconds, and the share of pictures skipped; None without a page."""
+        """Lateness of the pages' answers, in seconds, and share of pictures skipped; None without a page."""
         self.came = 0
         """Number of times that a page was opened or shown again."""
         self.words: deque[PageWords] = deque(maxlen=_MOST_HEARD)

@@ -9,9 +9,9 @@ nobody ─▶ resting ─▶ ready ─▶ running         the first page that as
 After a stop the inputs rest until the stop is reset: hold-to-run alone never arms again.
 After 300 ms of silence, or when the driving page stops driving or closes, nobody drives; the next page rests first.
 
-A key may come up while the page's drawing is late, and so unseen. So unconfirmed inputs, whether the page is late or
-silent, count in full for 150 ms, and less and less until 300 ms: the motion of a key that came up is at most 0.225 s of
-its speed, 19 mm more than if it ended at 150 ms, at 250 mm/s. After a second all keys must be up.
+A key may come up unseen while the page's drawing is late. So unconfirmed inputs count in full for 150 ms, and less and
+less until 300 ms, whether the page is late or silent. A key that came up moves the arm for at most 0.225 s of its
+speed: at 250 mm/s, 19 mm more than if it ended at 150 ms. After a second all keys must be up.
 """
 
 from collections import deque
@@ -65,9 +65,9 @@ class DrivingPage:
         self._latest_s = 0.0
         """Greatest age of unconfirmed inputs since all counted"""
         self.released = ""
-        """As in HandsFacts"""
+        """Why inputs were released without the page's doing, as in HandsFacts"""
         self.pace = PagePace()
-        """What the pages keep up with"""
+        """Rates that the pages keep up with"""
         self._up_since_s: float | None = None
         self.doing = Doing.NOBODY_DRIVES
         """Present action of the driving page, as of the last call"""

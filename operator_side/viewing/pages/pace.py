@@ -1,4 +1,4 @@
-"""Rates of the pictures and the scene that a page keeps up with, by how late it is and what it skips."""
+"""Rates of the pictures and the scene that a page keeps up with, by its lateness and the pictures that it skips."""
 
 import math
 from typing import Final, NamedTuple
@@ -32,8 +32,8 @@ _SKIPS, _TAKES = 0.3, 0.1
 """Share of the pictures that a page skips above which a slower pace is taken, and below which a faster one may be"""
 _DOWN_S: Final = 1.0
 _EAGER_S, _PATIENCE_S, _MOST_PATIENCE_S = 0.5, 4.0, 60.0
-"""Time, in seconds, before a faster pace is taken: while the page was never late; afterwards; and at most, as it
-doubles each time that a faster pace made the page late"""
+"""Time, in seconds, before a faster pace is taken: while the page was never late, and afterwards. It doubles each time
+that a faster pace was in vain, up to the third."""
 
 
 class PagePace:
