@@ -26,6 +26,8 @@ _PACES: Final = (
 """Paces from the fastest to the slowest: first the pictures give way, then the scene and the charts"""
 _BEGINS: Final = 3
 """Index of the first pace: pictures that two slow processors draw, code and show beside both sides"""
+_LAST_SKIPPED: Final = 4
+"""Index of the slowest pace that is taken because of skipped pictures: they are lost work, and make nobody wait"""
 _LATE_S, _EARLY_S = 0.2, 0.1
 """Lateness above which a slower pace is taken, and below which a faster one may be"""
 _SKIPS, _TAKES = 0.3, 0.1
@@ -70,8 +72,7 @@ class PagePace:
         late_s, skips = (0.0, 0.0) if late is None else late
         if late is None or late_s > _EARLY_S or skips > _TAKES:
             self._early_since_s = now_s
-        # A page that skips pictures is not late for it: the scene is not slowed.
-        skipping = skips > _SKIPS and _PACES[min(self._at + 1, len(_PACES) - 1)].scene_hz is None
+        skipping = skips > _SKIPS and self._at < _LAST_SKIPPED
         if (late_s > _LATE_S or skipping) and now_s - self._changed_s >= _DOWN_S:
             late_words = f"the page was late by {1e3 * late_s:.0f} ms"
             self._because = late_words if late_s > _LATE_S else f"the page skipped {100 * skips:.0f} % of them"

@@ -40,7 +40,7 @@ def test_an_early_page_soon_gets_all_and_nobody_nothing_new() -> None:
 def test_a_page_that_skips_pictures_gets_fewer_and_no_slower_scene() -> None:
     pace = PagePace()
     after(pace, 0.02, 20.0, 0.0, skips=0.4)
-    assert (pace.now, pace.because) == ((5.0, True, None), "the page skipped 40 % of them")
+    assert (pace.now, pace.because) == ((10.0, True, None), "the page skipped 40 % of them")
 
 
 def test_a_pace_that_made_the_page_late_is_tried_ever_less_often() -> None:
