@@ -55,6 +55,22 @@ def test_the_first_person_is_behind_the_palm_and_beside_it(tmp_path: Path) -> No
         assert 0 < column < WIDTH
 
 
+def test_the_first_person_starts_with_target_table_and_fingers_in_the_picture() -> None:
+    scene = load_scene()
+    view, data = viewpoints(scene)["first_person"], scene.data
+    far_edge_m = np.add(data.body("table_scene/table").xpos, (1.1, 0.0, 0.0))
+    fingers = data.geom_xpos[scene.robot.gripper_geoms[scene.robot.geom_on_finger]]
+    things = (data.body("table_scene/target").xpos, data.site(scene.robot.site).xpos, *fingers)
+    rows = []
+    for point_m in (far_edge_m, *things):
+        row, column, depth_m = project(scene, view, point_m)
+        assert depth_m > 0.0
+        assert 0 < column < WIDTH
+        rows.append(row / HEIGHT)
+    assert 0.25 < rows[0] < 0.5, "half of the picture is empty"
+    assert max(rows) < 1.0
+
+
 @pytest.mark.parametrize("view", VIEW_NAMES)
 @pytest.mark.parametrize("built_in", [True, False])
 def test_an_eye_sees_points_where_the_picture_has_them(built_in: bool, view: ViewName, tmp_path: Path) -> None:
