@@ -39,9 +39,13 @@ class Watchers:
         first, second = (max(numbers) for numbers in zip(*known, strict=True))
         return first, second
 
-    def pace(self, now_s: float) -> tuple[float, bool, float]:
-        """Return the limits of the slowest viewer: `picture_hz`, infinite for none, `halved` and `scene_hz`."""
-        watches = [watch for watch, heard_s in self._watching.values() if now_s - heard_s < WATCH_S]
+    def pace(self, owner: int | None, now_s: float) -> tuple[float, bool, float]:
+        """Return the limits `picture_hz`, infinite for none, `halved` and `scene_hz`, of the operator who drives.
+
+        owner: its epoch. If it does not watch, the slowest viewer counts: no observer slows an operator's pictures.
+        """
+        watching = {epoch: watch for epoch, (watch, heard_s) in self._watching.items() if now_s - heard_s < WATCH_S}
+        watches = [watching[owner]] if owner in watching else [*watching.values()]
         picture_hz = min((watch.picture_hz or math.inf for watch in watches), default=math.inf)
         scene_hz = min((watch.scene_hz or math.inf for watch in watches), default=math.inf)
         return picture_hz, any(watch.halved for watch in watches), scene_hz

@@ -89,7 +89,9 @@ class ViewScheduler:
         if not looked_at and now_s < self._next_look_s:
             return []
         self._next_look_s = now_s + _SEEN_TO_S
-        most_hz, halved, self._scene_hz = self._session.watchers.pace(now_s)
+        owner = self._session.lease.owner
+        of = None if owner is None else owner.epoch
+        most_hz, halved, self._scene_hz = self._session.watchers.pace(of, now_s)
         if self._cameras is not None:
             control = self._cameras.picture_rate_control
             control.most_hz, control.halved = most_hz, halved

@@ -1,3 +1,4 @@
+import math
 from typing import Any
 
 import pytest
@@ -56,6 +57,16 @@ def test_pictures_are_steps_only_if_all_their_viewers_show_steps() -> None:
     assert watchers.lacks(WATCH_S) == (2, 9)
     watchers.heard(4, Watch(header, overview=True), 0.6)
     assert watchers.lacks(0.7) is None
+
+
+def test_no_observer_slows_the_pictures_of_the_operator_who_drives() -> None:
+    watchers, header = Watchers(), Bench().operator(1).link.stamp(0.0)
+    assert watchers.pace(1, 0.0) == (math.inf, False, math.inf)
+    watchers.heard(2, Watch(header, overview=True, picture_hz=0.1, halved=True, scene_hz=0.1), 0.0)
+    assert watchers.pace(1, 0.1) == watchers.pace(None, 0.1) == (0.1, True, 0.1)
+    watchers.heard(1, Watch(header, overview=True, picture_hz=20.0), 0.1)
+    assert watchers.pace(1, 0.2) == (20.0, False, math.inf)
+    assert watchers.pace(None, 0.2) == (0.1, True, 0.1)
 
 
 def test_each_viewer_that_begins_to_look_is_counted_once() -> None:
