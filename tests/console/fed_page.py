@@ -10,8 +10,9 @@ from typing import Any, Final
 from msgspec.structs import replace
 
 from common.clock import MonotonicClock
+from common.protocol.codec import decode_view, encode
 from common.protocol.messages import MotionState
-from common.protocol.view_messages import VIEW_NAMES
+from common.protocol.view_messages import VIEW_NAMES, SceneState
 from common.status.codes import InputSource
 from operator_side.viewing.console.console import Console
 from operator_side.viewing.facts import HandsFacts, PictureFacts, PictureState
@@ -35,11 +36,15 @@ class Fed:
     state: MotionState = "armed"
     status: dict[str, Any] = field(default_factory=dict)
     """Changes to the status"""
+    scene: dict[str, Any] = field(default_factory=dict)
+    """Changes to the scene's state"""
     page: HandsFacts = field(default_factory=lambda: HandsFacts(True, "page", False, "", None, yields=(False, True)))
     """Facts for the page; a page that asks to drive is the driver"""
     pictures: PictureFacts = FRESH
     hands: deque[dict[str, Any]] = field(default_factory=lambda: deque(maxlen=1000))
     """Inputs that pages have sent, newest last"""
+    stops: bool = False
+    """Whether the page's emergency stop has come"""
     notes: list[str] = field(default_factory=list)
     address: str | None = None
     ends: threading.Event = field(default_factory=threading.Event)
@@ -54,6 +59,7 @@ class Fed:
                     if said is not None and "hands" in said:
                         self.hands.append(said["hands"])
                         driver = said["hands"]["page"] if said["hands"]["driving"] else ""
+                        self.stops |= said["hands"]["stop"]
                 console.words.clear()
                 made = facts(now_s, self.state)
                 page = replace(self.page, driver=driver or self.page.driver)
@@ -62,7 +68,9 @@ class Fed:
                     console.note(self.notes.pop())
                 if step % 20 == 0:
                     console.view(shapes(), video=False)
-                console.view(state(now_s), video=False)
+                sways = decode_view(state(now_s))
+                assert isinstance(sways, SceneState)
+                console.view(encode(replace(sways, **self.scene)), video=False)
                 if self.tells:
                     told = {"hands": InputSource.BROWSER, "page": page, "status": status, "pictures": self.pictures}
                     console.facts(replace(made, **told))

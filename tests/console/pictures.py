@@ -11,7 +11,8 @@ import pytest
 from common.errors import FeelaheadError
 from tests.console.film_of_compare import make_compare_film
 from tests.console.picture_of_terminal import make_picture_of_terminal
-from tests.console.pictures_of_page import SIZES, STATES, make_first_minute, make_states
+from tests.console.pictures_of_page import SIZES, make_first_minute, make_states
+from tests.console.states import STATES
 from tests.helpers.repository import ROOT
 
 DOCS: Final = ROOT / "docs"

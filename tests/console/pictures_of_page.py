@@ -5,17 +5,13 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
-from msgspec.structs import replace
 from PIL import Image
 
-from common.status.codes import Doing, LinkState
-from operator_side.viewing.facts import PictureState
 from tests.console.browser import LARGE, SMALL, Page, browser
-from tests.console.fed_page import FRESH, fed_page
-from tests.console.run import DRAWN, STATE, Run, running
+from tests.console.run import DRAWN, Run, running
+from tests.console.states import states
 from tests.console.test_hands import is_armed, pull, take_over
 
-STATES: Final = ("waiting", "ready", "armed", "running", "amber", "dead", "stopped", "link-lost", "ended")
 SIZES: Final = (SMALL, LARGE, (640, 800), (640, 360))
 """The last is SMALL at 200 % zoom."""
 _MEETS: Final = "parseInt(document.querySelector('#r2 .meets').textContent.match(/[0-9]+/)[0])"
@@ -50,51 +46,13 @@ def make_states(folder: Path, paths: Sequence[Path]) -> None:
     """Write a PNG of each state in each size. The content is made up, so that every state can be had at once."""
     del folder
     to_make = iter(paths)
-
-    def keep(page: Page) -> None:
-        for width, height in SIZES:
-            page.raw.set_viewport_size({"width": width, "height": height})
-            time.sleep(_CALM_S)
-            path = next(to_make)
-            page.raw.evaluate("scrollTo(0, 0)")
-            path.write_bytes(page.shot())
-
-    with browser(paths[0].parent) as one, fed_page(one) as (fed, page):
-        fed.tells = fed.sends = False
-        with one.page(str(fed.address)) as opened:
-            keep(opened)
-        fed.tells = fed.sends = True
-        fed.page = replace(fed.page, driver=None)
-        fed.state, fed.status = "disarmed", {"person": Doing.READY}
-        page.raw.click("#drive")
-        page.wait_for_text("#hands_state", "Ready")
-        keep(page)
-        fed.state, fed.status = "armed", {}
-        page.raw.click("#drive")
-        keep(page)
-        fed.status = {"person": Doing.READY}
-        page.raw.click("#drive")
-        page.wait_for_text("#hands_state", "Ready")
-        with page.held("Space"):
-            fed.status = {"person": Doing.RUNNING}
-            page.wait_for_text("#hands_state", "You drive")
-            keep(page)
-            shown, fed.page = fed.page, replace(fed.page, counts=0.0, because="pictures are 1000 ms old")
-            fed.age_s, fed.pictures = 1.0, replace(FRESH, states=(PictureState.OLD,) * 2)
-            keep(page)
-            fed.sends, fed.pictures = False, replace(FRESH, states=(PictureState.DEAD,) * 2)
-            keep(page)
-        fed.page, fed.age_s, fed.sends, fed.pictures = replace(shown, reset_first=True), 0.0, True, FRESH
-        fed.state, fed.status = "stopped", {"person": Doing.ALL_KEYS_UP_FIRST}
-        page.wait(f"{STATE} == 'stopped'", "shown as stopped")
-        keep(page)
-        fed.state, fed.page, fed.status = "armed", shown, {"link": LinkState.LOST, "person": Doing.ALL_KEYS_UP_FIRST}
-        page.wait(f"{STATE} == 'lost'", "shown as lost")
-        keep(page)
-        fed.ends.set()
-        page.wait_for_text("#lost", "run has ended")
-        keep(page)
-        page.complaints.clear()  # the console is gone
+    with browser(paths[0].parent) as one:
+        for _, page in states(one):
+            for width, height in SIZES:
+                page.raw.set_viewport_size({"width": width, "height": height})
+                time.sleep(_CALM_S)
+                page.raw.evaluate("scrollTo(0, 0)")
+                next(to_make).write_bytes(page.shot())
 
 
 def _settle(page: Page) -> None:

@@ -71,16 +71,20 @@ class Cues:
         self._shapes = shapes
 
     def of(self, state: SceneState) -> dict[str, Any]:
-        """Return the page's `target` and `drop`, each None if unknown."""
+        """Return the page's `target`, `drop` and `tool`, the gripper's point in each view; each None if unknown."""
         shapes = self._shapes
         if shapes is None or shapes.version != state.version:
-            return {"target": None, "drop": None}
+            return {"target": None, "drop": None, "tool": None}
         index = np.frombuffer(state.object_index, np.uint32)
         known = index < len(self._poses)
         self._poses[index[known]] = np.frombuffer(state.object_poses, np.float32).reshape(-1, 7)[known]
         tool = np.array(state.tool_pose)
         eyes = ((shapes.overview_eye, _STILL), (shapes.eye, tool))
-        return {"target": self._target(shapes, state, tool, eyes), "drop": self._drop(shapes, state, tool, eyes)}
+        return {
+            "target": self._target(shapes, state, tool, eyes),
+            "drop": self._drop(shapes, state, tool, eyes),
+            "tool": _flat(tool[None, :3], eyes),
+        }
 
     def _target(self, shapes: SceneShapes, state: SceneState, tool: Floats, eyes: "_Eyes") -> dict[str, Any] | None:
         """Return the target's name, its outline in each view, and the way of its centre: right, up and ahead."""
@@ -110,9 +114,7 @@ class Cues:
         if held in shapes.objects:
             owner = shapes.objects.index(held)
             height_m = max(0.0, self._body(owner).lowest_m(self._poses[owner]) - (tool_m - far_m))
-        lines = [None if eye is None else seen(ends, frame, eye) for eye, frame in eyes]
-        flat = [None if line is None else [*map(float, np.ravel(line))] for line in lines]
-        return {"name": name, "height_m": height_m, "lines": flat}
+        return {"name": name, "height_m": height_m, "lines": _flat(ends, eyes)}
 
     def _body(self, owner: int) -> _Body:
         if owner not in self._bodies:
@@ -122,3 +124,9 @@ class Cues:
 
 _Eyes = tuple[tuple[Eye | None, Floats], tuple[Eye | None, Floats]]
 """Eye of each view, in the order of VIEW_NAMES, and the pose of the frame in which the eye is given"""
+
+
+def _flat(points: Floats, eyes: _Eyes) -> list[list[float] | None]:
+    """Return where each view has points (n, 3) of the world frame, as 2n numbers; None where one is behind the eye."""
+    places = [None if eye is None else seen(points, frame, eye) for eye, frame in eyes]
+    return [None if place is None else [*map(float, np.ravel(place))] for place in places]

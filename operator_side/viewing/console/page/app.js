@@ -5,6 +5,8 @@ import { make } from "./make.js";
 import { InputSource, LinkState, MotionState, ShownKind, VIEWS } from "./names.js";
 import { Overlay } from "./overlay.js";
 import { Player } from "./player.js";
+import { Replay } from "./replay.js";
+import { Sound } from "./sound.js";
 import { Clock, View } from "./views.js";
 import { Trigger } from "./triggers.js";
 
@@ -15,14 +17,15 @@ const MOST_NOTES = 50;
 const FIGURES = {
   // figures in the bar: id of the element, and title
   link: "Link",
+  target: "Target",
   lease: "Lease",
+  holding: "Holding",
   whose: "Hands",
+  pictures: "Pictures",
   delay: "Delay there / back",
   rate: "Rate / queue / lost",
-  pictures: "Pictures",
-  target: "Target",
-  holding: "Holding",
 };
+const SHOWN = new Set([ShownKind.FACTS, ShownKind.SCENE, ...VIEWS.keys()]); // what can be played again
 const byId = (id) => document.getElementById(id);
 
 for (const [id, title] of Object.entries(FIGURES)) {
@@ -31,7 +34,8 @@ for (const [id, title] of Object.entries(FIGURES)) {
 
 const clock = new Clock();
 const views = VIEWS.map((name) => new View(byId(name), clock));
-const overlay = new Overlay(VIEWS.map(byId));
+const overlay = new Overlay(VIEWS.map(byId), document.querySelector(".near"));
+const sound = new Sound(byId("sound"));
 const triggers = { l2: new Trigger(byId("l2"), "L2"), r2: new Trigger(byId("r2"), "R2") };
 const charts = {
   delay: new Chart(byId("delay_chart"), "delay", "ms", [["to here", "--l2"], ["to the robot", "--r2", [5, 3]]]),
@@ -46,6 +50,7 @@ let everHeard = false;
 let closedBecause = "";
 let facts = null;
 let chartsDue = 0; // refreshes until a late page's charts are drawn
+let felt = null; // message of facts that views and triggers show: the newest, or one that is played again
 let drawn = false;
 const frame = document.querySelector("#scene iframe");
 const slow = drawsSlowly();
@@ -55,14 +60,18 @@ let ended = ""; // why the connection is expected to end
 const wire = new Worker("wire.js");
 const send = (object) => wire.postMessage(object);
 const hands = new Hands(document, send, () => views[0].capturedS);
-const player = new Player(byId("player"), send);
+const replay = new Replay((kind, data) => show(typeof data === "string" ? JSON.parse(data) : { kind }, data));
+const replayButton = make("button", { type: "button", id: "replay", onclick: () => (replay.open ? goLive() : playAgain()) });
+byId("player").append(replayButton);
+const player = new Player(byId("player"), ({ play }) => (run.live ? replay.wish(play, performance.now()) : send({ play })));
+byId("drive").addEventListener("click", goLive);
 
 function connect() {
   const address = new URL("live", location.href);
   address.protocol = "ws:";
   wire.onmessage = ({ data }) => {
-    if (typeof data === "string") receive(JSON.parse(data));
-    else if (data instanceof ArrayBuffer) views[new DataView(data).getUint8(0)]?.receive(data);
+    if (typeof data === "string") take(JSON.parse(data), data);
+    else if (data instanceof ArrayBuffer) take({ kind: new DataView(data).getUint8(0) }, data);
     else {
       open = data.open;
       if (open) send({ slow, looks: !document.hidden });
@@ -78,10 +87,15 @@ function answer() {
   else requestAnimationFrame(() => send({ taken: true }));
 }
 
+function take(message, data) {
+  receive(message);
+  if (run.live && SHOWN.has(message.kind)) replay.keep(message.kind, data, performance.now());
+  if (!replay.open) show(message, data);
+}
+
 function receive(message) {
   if (message.kind === ShownKind.END) answer();
   else if (message.kind === ShownKind.FACTS) showFacts(message);
-  else if (message.kind === ShownKind.SCENE) showScene(message);
   else if (message.kind === ShownKind.NOTE) showNote(message.text);
   else if (message.kind === ShownKind.ENDED) ended ||= "THE RUN HAS ENDED";
   else if (message.kind === ShownKind.RUN) {
@@ -91,11 +105,39 @@ function receive(message) {
     clock.live = run.live;
     document.title = `feelahead: ${run.title}`;
     document.body.classList.toggle("replay", !run.live);
-    byId("player").hidden = run.live;
+    replayButton.hidden = !run.live;
+    replay.forget();
+    goLive();
   } else if (message.kind === ShownKind.PLAYER) {
     player.show(message);
     if (!facts) goWithoutFacts(message.at_s);
   }
+}
+
+// Show what can be played again: views, scene and triggers.
+function show(message, data) {
+  if (message.kind === ShownKind.FACTS) showFelt(message);
+  else if (message.kind === ShownKind.SCENE) showScene(message);
+  else views[message.kind]?.receive(data);
+}
+
+function playAgain() {
+  hands.leave("The last seconds are played again.");
+  replay.begin(performance.now());
+  stepReplay();
+}
+
+function goLive() {
+  replay.end();
+  stepReplay();
+}
+
+function stepReplay() {
+  replay.step(performance.now());
+  document.body.classList.toggle("again", replay.open);
+  const words = replay.open ? "Back to live" : "Play 20 s again";
+  if (replayButton.textContent !== words) replayButton.textContent = words;
+  if (run.live) player.show(replay.state);
 }
 
 // Show a recording made by a robot side alone: it has pictures and a scene, but no facts of an operator side.
@@ -111,6 +153,7 @@ function text(id, value, bad = false) {
   const shown = value ?? "–";
   if (place.textContent !== shown) place.textContent = shown;
   place.classList.toggle("bad", bad);
+  if (place.tagName === "DD") place.title = shown;
 }
 
 const ms = (value) => (value === null ? "?" : value.toFixed(value < 10 ? 1 : 0));
@@ -124,6 +167,7 @@ function showFacts(message) {
   const { said } = message;
   document.body.dataset.state = said.border;
   text("state", said.state);
+  byId("state").classList.toggle("long", said.state.length > 9);
   text("why", [...said.why, run.live ? null : "replay"].filter(Boolean).join(" · "));
   text("link", said.link, status.link !== LinkState.UP);
   text("lease", said.lease);
@@ -132,14 +176,25 @@ function showFacts(message) {
   showLink(status);
   text("target", status.target ?? "none");
   text("holding", said.holding);
-  triggers.l2.show(facts.l2, message.fingers[0], facts.advancing === "L2", facts.page?.yields?.[0]);
-  triggers.r2.show(facts.r2, message.fingers[1], facts.advancing === "R2", facts.page?.yields?.[1]);
-  charts.delay.add(clock.nowMs, [facts.to_operator.newest_ms, facts.to_robot.newest_ms]);
+  addTo(charts.delay, [facts.to_operator.newest_ms, facts.to_robot.newest_ms]);
   const asked = [["robot", facts.to_robot.asked], ["operator", facts.to_operator.asked]].filter(([, words]) => words);
   charts.delay.said = asked.map(([side, words]) => `emulated to the ${side}: ${words}`).join("; ");
-  charts.stiffness.add(clock.nowMs, [facts.l2.course_stiffness, facts.r2.course_stiffness]);
+  addTo(charts.stiffness, [facts.l2.course_stiffness, facts.r2.course_stiffness]);
   hands.show(facts);
   showCounts(facts);
+}
+
+function showFelt(message) {
+  felt = message;
+  const { facts: { l2, r2, advancing, page }, fingers } = message;
+  triggers.l2.show(l2, fingers[0], advancing === "L2", page?.yields?.[0]);
+  triggers.r2.show(r2, fingers[1], advancing === "R2", page?.yields?.[1]);
+  sound.play(message.facts, fingers);
+}
+
+// While the last seconds are played again, the charts show these, and a line through them.
+function addTo(chart, values) {
+  if (!replay.open) chart.add(clock.nowMs, values);
 }
 
 // The operator side lets a page's hands fade while the pictures are old or the page is late, and says so.
@@ -159,7 +214,8 @@ function showLink(status) {
   text("rate", `${rate} / ${figure(status.queue_ms)} ms / ${figure(status.lost_percent, 1)} %`, status.queue_ms > 50);
   const held = status.held_back ? `; held back: ${status.held_back}` : "";
   const late = facts.page?.fewer ? `; fewer, as ${facts.page.fewer}` : "";
-  text("pictures", `${status.pictures ?? "?"}${held}${late}`);
+  text("pictures", `${held ? "held back; " : late ? "fewer; " : ""}${status.pictures ?? "?"}`, Boolean(held || late));
+  byId("pictures").title = `${status.pictures ?? "?"}${held}${late}`;
 }
 
 byId("again").onclick = () => {
@@ -198,9 +254,9 @@ function showScene(scene) {
   // Only now, as viser has no camera position before the first scene.
   if (drawn && !frame.src) frame.src = sceneAddress();
   frame.hidden = !drawn;
-  overlay.show(scene, facts);
-  charts.overlap.add(clock.nowMs, scene.overlap_mm3);
-  charts.tick.add(clock.nowMs, scene.tick_us);
+  if (felt) overlay.show(scene, felt.facts, felt.fingers);
+  addTo(charts.overlap, scene.overlap_mm3);
+  addTo(charts.tick, scene.tick_us);
   const rows = scene.objects.map(({ name, role, overlap_mm3: [l2, r2] }) => {
     const row = document.createElement("tr");
     for (const [content, kind, small] of [[name, "", role], [l2, "l2"], [r2, "r2"]]) {
@@ -230,7 +286,7 @@ function refresh() {
   refreshedMs = nowMs;
   const silentMs = nowMs - heardMs;
   const lost = !open || ((run.live || !everHeard) && silentMs > SILENCE_MS);
-  byId("lost").hidden = !lost;
+  byId("lost").hidden = !lost || Boolean(ended && replay.open);
   if (lost) {
     const [word, because] = byId("lost").children;
     word.textContent = ended || (open ? (everHeard ? "NOTHING HEARD" : "WAITING FOR THE OPERATOR SIDE") : "CONNECTION LOST");
@@ -238,7 +294,8 @@ function refresh() {
     because.textContent = ended ? "" : old + (open ? "The operator side is silent." : `The console: ${closedBecause || "not reached yet"}.`);
   }
   const limits = facts?.pictures;
-  views.forEach((view, k) => view.showAge(limits?.states[k] ?? null, limits?.old_s[k] ?? null));
+  if (replay.open) views.forEach((view) => view.showReplay((replay.untilMs - replay.atMs) / 1000));
+  else views.forEach((view, k) => view.showAge(limits?.states[k] ?? null, limits?.old_s[k] ?? null));
 }
 
 // A late page draws its charts seldom.
@@ -246,10 +303,11 @@ function drawCharts() {
   chartsDue -= 1;
   if (chartsDue > 0 && facts?.page?.seldom) return;
   chartsDue = SELDOM;
-  Object.values(charts).forEach((chart) => chart.draw(clock.nowMs));
+  Object.values(charts).forEach((chart) => chart.draw(replay.open ? replay.untilMs : clock.nowMs, replay.atMs));
 }
 
 document.addEventListener("visibilitychange", () => send({ looks: !document.hidden }));
 connect();
 setInterval(refresh, REFRESH_MS);
 setInterval(drawCharts, REFRESH_MS);
+setInterval(() => replay.open && stepReplay(), 30);

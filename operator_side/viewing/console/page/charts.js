@@ -31,7 +31,8 @@ export class Chart {
     return shown === words ? words : `${shown}…`;
   }
 
-  draw(nowMs) {
+  // atMs: moment of a line across the chart; null for none.
+  draw(nowMs, atMs = null) {
     const ratio = devicePixelRatio || 1;
     const { clientWidth: width, clientHeight: height } = this.#canvas;
     if (!width || !height) return;
@@ -60,6 +61,10 @@ export class Chart {
       context.lineTo(right, y(value));
       context.stroke();
       context.fillText(value < 1000 ? `${value}` : `${value / 1000}k`, right + 4, y(value) + 4);
+    }
+    if (atMs !== null && atMs > nowMs - SPAN_MS) {
+      context.fillStyle = color("--again");
+      context.fillRect(x(atMs) - 1, upper, 3, lower - upper);
     }
     context.font = `600 12px ${FONT}`;
     context.fillStyle = color("--text");

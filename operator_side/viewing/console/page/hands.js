@@ -83,6 +83,10 @@ export class Hands {
     this.#draw();
   }
 
+  leave(why) {
+    this.#end(why);
+  }
+
   get #hands() {
     return this.#facts?.page ?? null;
   }

@@ -1,6 +1,7 @@
 // Panel for driving: its texts, buttons and elements to hold.
 import { KEYS, keyWords, MARKS } from "./inputs.js";
 import { make } from "./make.js";
+import { SOUND_KEY } from "./sound.js";
 import { Doing, InputSource, LinkState, MotionState, SessionState } from "./names.js";
 
 const FULL = "Travel of keys: 1 to 9";
@@ -34,9 +35,10 @@ export class Panel {
       place("drive", make("button", { type: "button", id: "drive", onclick: drive }, "Drive from here")),
       place("giveBack", make("button", { type: "button", id: "give_back", onclick: giveBack, hidden: true,
         title: "The scripted person goes on" }, "Hand back")),
-      place("state", make("p", { id: "hands_state", tabIndex: -1, role: "status" })),
-      place("rest", make("p", { id: "hands_rest" })),
-      place("stopped", make("p", { id: "hands_stopped", role: "alert" })));
+      make("div", { className: "words" },
+        place("stopped", make("p", { id: "hands_stopped", role: "alert" })),
+        place("state", make("p", { id: "hands_state", tabIndex: -1, role: "status" })),
+        place("rest", make("p", { id: "hands_rest" }))));
     this.#section.replaceChildren(
       make("h2", {}, "Hands"),
       place("level", make("p", { id: "hands_level" })),
@@ -56,7 +58,8 @@ export class Panel {
         make("dt", {}, ...codes.flatMap((code, k) => [k ? " or " : "", make("kbd", {}, word(code))])), make("dd", {}, does),
       ]), make("dt", {}, make("kbd", {}, "1"), " … ", make("kbd", {}, "9")), make("dd", {}, `travel of keys. ${YIELDS}`),
       make("dt", {}, make("kbd", {}, "Esc")), make("dd", {}, "emergency stop, for any driver"),
-      make("dt", {}, make("kbd", {}, word("KeyX"))), make("dd", {}, "reset a stop"));
+      make("dt", {}, make("kbd", {}, word("KeyX"))), make("dd", {}, "reset a stop"),
+      make("dt", {}, make("kbd", {}, word(SOUND_KEY))), make("dd", {}, "sound on or off"));
     });
   }
 

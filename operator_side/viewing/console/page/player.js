@@ -1,4 +1,4 @@
-// Controls of a replayed recording: play and pause, position, and speed.
+// Controls of what is played again, a recording or a live run's last seconds: play and pause, position, and speed.
 import { make } from "./make.js";
 
 const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 5, 10];
@@ -18,8 +18,8 @@ export class Player {
     this.#where = make("output", { htmlFor: "moment" });
     this.#speed = make("select", { id: "speed" });
     this.#speed.setAttribute("aria-label", "Speed");
-    const first = make("div", {}, this.#button, this.#speed, this.#where);
-    section.replaceChildren(make("h2", {}, "Recording"), first, make("div", {}, this.#slider));
+    section.append(this.#button, this.#speed, this.#slider, this.#where);
+    this.show(null);
     this.#button.onclick = () => this.#state && this.#wish({ paused: !this.#state.paused });
     this.#speed.onchange = () => this.#wish({ speed: Number(this.#speed.value) });
     this.#slider.oninput = () => {
@@ -28,17 +28,20 @@ export class Player {
     };
   }
 
+  // state: null while nothing is played again.
   show(state) {
     this.#state = state;
-    this.#button.textContent = state.paused ? "▶ play" : "❚❚ pause";
-    this.#where.textContent = `${state.at_s.toFixed(1)} of ${state.length_s.toFixed(1)} s`;
-    this.#slider.max = state.length_s;
-    if (performance.now() - this.#movedMs > FOLLOWS_MS) this.#slider.value = state.at_s;
-    const speeds = [...new Set([...SPEEDS, state.speed])].sort((a, b) => a - b);
+    const { at_s = 0, length_s = 0, speed = 1, paused = true } = state ?? {};
+    for (const one of [this.#button, this.#slider, this.#speed]) one.disabled = state === null;
+    this.#button.textContent = paused ? "▶ play" : "❚❚ pause";
+    this.#where.textContent = state ? `${at_s.toFixed(1)} of ${length_s.toFixed(1)} s` : "";
+    this.#slider.max = length_s;
+    if (performance.now() - this.#movedMs > FOLLOWS_MS) this.#slider.value = at_s;
+    const speeds = [...new Set([...SPEEDS, speed])].sort((a, b) => a - b);
     if (this.#speed.length !== speeds.length) {
-      this.#speed.replaceChildren(...speeds.map((speed) => new Option(`${speed} ×`, speed)));
+      this.#speed.replaceChildren(...speeds.map((one) => new Option(`${one} ×`, one)));
     }
-    if (document.activeElement !== this.#speed) this.#speed.value = state.speed;
+    if (document.activeElement !== this.#speed) this.#speed.value = speed;
   }
 
   #wish(play) {

@@ -2,7 +2,15 @@
 import { make } from "./make.js";
 
 const ZONES = 10;
-const STRONGEST = 8;
+export const STRONGEST = 8;
+
+// Strength that a trigger meets, and the strongest up to one zone farther: there a key's pull stops. finger: its place in the
+// zones, 0 to 1; null without one.
+export function strengths(facts, finger) {
+  if (finger === null) return { meets: 0, ahead: 0 };
+  const zone = Math.min(Math.floor(ZONES * finger), ZONES - 1);
+  return { meets: facts.meets, ahead: Math.max(facts.meets, ...facts.zones.slice(zone, zone + 2)) };
+}
 
 export class Trigger {
   #name; #title; #meets; #bars; #finger; #words;

@@ -43,8 +43,7 @@ export class Tuning {
       return make("div", { className: "tune" }, make("label", { htmlFor: slider.id }, label), slider, now);
     };
     section.replaceChildren(
-      make("h2", {}, "Tuning"),
-      this.#reason,
+      make("div", { className: "head" }, make("h2", {}, "Tuning"), this.#reason),
       row("probability", "P: warned in time", PROBABILITIES.length - 1, 1, (value) => `${PROBABILITIES[value]}`),
       row("delay", "Delay, each way", 400, 5, (value) => `${value} ms`),
       row("jitter", "Jitter", 50, 1, (value) => `${value} ms`),
@@ -59,7 +58,6 @@ export class Tuning {
       : !facts.may_tune ? "This run does not permit tuning (robot side: --permit-tuning)."
       : facts.page?.tuning_refused ?? "";
     if (this.#reason.textContent !== reason) this.#reason.textContent = reason;
-    this.#reason.hidden = reason === "";
     const link = readWords(asked[0]);
     const holds = { probability: facts.probability === null ? null : nearest(facts.probability), ...link };
     for (const [name, { slider, now, words }] of Object.entries(this.#sliders)) {

@@ -75,6 +75,12 @@ export class View {
     this.#busy = false;
   }
 
+  // beforeS: seconds from the picture that is played again to the end of what is.
+  showReplay(beforeS) {
+    this.#place.dataset.age = "replay";
+    this.#age.textContent = `REPLAY, ${beforeS.toFixed(1)} s before`;
+  }
+
   // state: of the pictures, as the operator side says; oldS: age from which they are old. Both null while unknown.
   showAge(state, oldS) {
     if (this.capturedS === null) return;

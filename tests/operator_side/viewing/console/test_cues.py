@@ -66,6 +66,7 @@ def test_both_views_have_the_line_and_the_target() -> None:
     overview, first_person = shown["drop"]["lines"]
     # From 2 m above: half the height of the picture is the depth; right is -y.
     assert overview == pytest.approx([-0.1 / 1.8, 0.0, -0.1 / 2.0, 0.0], abs=1e-6)
+    assert shown["tool"] == [pytest.approx(line[:2]) for line in (overview, first_person)]
     assert first_person == pytest.approx([0.0, -0.1 / 0.3, 0.0, -0.3 / 0.3])
     target = shown["target"]
     assert (target["name"], target["way_m"]) == ("mug", pytest.approx([0.1, -0.15, 0.12]))
@@ -79,7 +80,8 @@ def test_unknown_eyes_leave_the_figures() -> None:
     shown = scene((0.4, 0.0, 0.2), eye=None, overview_eye=None)
     assert shown["drop"]["lines"] == [None, None]
     assert shown["target"]["boxes"] == [None, None]
+    assert shown["tool"] == [None, None]
     assert shown["drop"]["height_m"] == pytest.approx(0.2)
     now = decode_view(state(0.0))
     assert isinstance(now, SceneState)
-    assert Cues().of(now) == {"target": None, "drop": None}
+    assert Cues().of(now) == {"target": None, "drop": None, "tool": None}
