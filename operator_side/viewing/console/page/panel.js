@@ -110,7 +110,7 @@ export class Panel {
       watching: [why, taken, cannot || (taken ? "" : "You are watching.")].filter(Boolean).join(" "),
       resting: [why, cannot || (hands?.reset_first ? "Reset the stop first." : "All keys up for a second.")].filter(Boolean).join(" "),
       ready: cannot || "Ready: hold Space to arm and run.",
-      running: hands?.counts < 1 ? "Pictures are old: the hands are off until they are fresh." : moves ? "You drive." : facts?.status.person === Doing.AT_REST_FIRST ? "Release all but hold-to-run." : "Arming: keep holding.",
+      running: hands?.counts < 1 ? `Your keys fade: ${hands.because}.` : moves ? "You drive." : facts?.status.person === Doing.AT_REST_FIRST ? "Release all but hold-to-run." : "Arming: keep holding.",
     }[state]);
     this.#text("rest", state === "resting" && !hands?.reset_first ? `still ${(restMs / 1000).toFixed(1)} s` : "");
     this.#text("level", state === "watching" ? "" : `${FULL}; now ${level}. ${YIELDS}.`);
