@@ -12,6 +12,7 @@ const far = (metres) => (metres === null ? "beyond 3 m" : metres < TOUCHED_M ? "
 const SIDES = [["left", "right"], ["down", "up"], ["behind", "ahead"]]; // by the keys that move the gripper there
 const GAUGES = { l2: -1, r2: 1 }; // side of the gripper's point on which each trigger's arc stands
 const RADII = [0.2, 0.5]; // of these arcs in each view, in half heights of the picture
+const ARC_PX = 10; // between an arc and what it stands beside
 const [LABEL_PX, PAD_PX, SIGN_PX] = [20, 12, 11]; // height of a label; most width of its padding, and of a character
 const PLACES = ["nearest", "target", "middle", "height", "ahead", "holding", "rumble", "also"];
 
@@ -122,6 +123,15 @@ class Marks {
     this.#write(this.#height, height, [[x2 - width / 2, y2 + half / 45 + 2], ...beside], whole);
   }
 
+  // Return where the middle of an arc round (x, y) must be for it to stand outside the target, as far as the view allows.
+  #besideAll(x, y, to, radius, reach, whole) {
+    const inner = x + to * reach;
+    const arc = { x: Math.min(inner, x + to * radius), y: y - reach, width: radius - reach, height: 2 * reach };
+    const shifts = this.#free.filter((box) => meet(arc, box)).map((box) => to * ((to > 0 ? box.x + box.width : box.x) - inner) + ARC_PX);
+    const most = (to > 0 ? whole[0] - x : x) - radius - ARC_PX;
+    return x + to * Math.max(0, Math.min(most, Math.max(0, ...shifts)));
+  }
+
   // Track in black, up to it the strength that lies ahead, thin, and the strength that the trigger meets, thick.
   #showArc(side, tool, felt, { half, centre, whole }) {
     const { group, parts, words } = this.#arcs[side];
@@ -129,8 +139,9 @@ class Marks {
     group.toggleAttribute("hidden", !shown);
     words.hidden = true;
     if (!shown) return;
-    const [x, y, radius] = [centre[0] + tool[0] * half, centre[1] - tool[1] * half, this.#radius * half];
-    const [to, reach] = [GAUGES[side], radius * Math.SQRT1_2];
+    const [to, y, radius] = [GAUGES[side], centre[1] - tool[1] * half, this.#radius * half];
+    const reach = radius * Math.SQRT1_2;
+    const x = this.#besideAll(centre[0] + tool[0] * half, y, to, radius, reach, whole);
     const path = `M${(x + to * reach).toFixed(1)} ${(y + reach).toFixed(1)}A${radius.toFixed(1)} ${radius.toFixed(1)} 0 0 ${to > 0 ? 0 : 1} ` +
       `${(x + to * reach).toFixed(1)} ${(y - reach).toFixed(1)}`;
     [STRONGEST, felt.ahead, felt.meets].forEach((strength, k) => {
@@ -187,7 +198,7 @@ export class Overlay {
     const aims = target && target !== near.held;
     const rows = {
       nearest: [!(aims && near.nearest === target) && ["nearest", near.nearest === null ? "nothing" : `${near.nearest} ${far(near.nearest_m)}`, touched]],
-      target: [aims && ["target", `${target} ${far(near.target_m)}${seen.at(-1) ? "" : ", out of view"}`, touched && near.nearest === target]],
+      target: [aims && ["target", `${target} ${far(near.target_m)}${seen.at(-1) ? "" : ", unseen"}`, touched && near.nearest === target]],
       middle: [aims && way && ["middle", way]],
       height: [drop && ["height", `${mm(drop.height_m)} mm over ${drop.name}`]],
       ahead: [most?.overlap_mm3[column] > 0 && ["ahead", most.name, true]],
