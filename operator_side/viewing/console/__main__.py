@@ -259,16 +259,11 @@ def _role(state: SceneState, index: int) -> Role:
 def said(facts: OperatorFacts) -> dict[str, Any]:
     """Return the texts that a page shows, and the colour of its border (`Border`); None for what is unknown."""
     status, view = facts.status, LiveView(None, facts.status)
-    border, page = view.border, facts.page
-    state = view.phase if view.alarm or border is Border.STARTING else words(border)
-    why = (None if state == view.phase else view.phase, view.reason)
-    if border is Border.STOPPED and page is not None and page.may_drive and not page.reset_first:
-        # The robot side calls the arm stopped until it is armed again.
-        border, state, why = Border.DISARMED, words(Border.DISARMED), ("the stop was reset", None)
+    state = view.phase if view.alarm or view.border is Border.STARTING else words(view.border)
     return {
-        "border": border,
+        "border": view.border,
         "state": state.upper(),
-        "why": why,
+        "why": (None if state == view.phase else view.phase, view.reason),
         "link": link_words(status),
         "lease": lease_words(status.owner) or None,
         "whose": "scripted person" if facts.hands is InputSource.PERSON else words(facts.hands),
