@@ -47,7 +47,7 @@ _SEEN: Final = """() => {
         frames: Number(document.querySelector('.view').dataset.frames ?? 0),
     };
 }"""
-_DRIVES_OR_LATE: Final = "/You drive|All keys up/.test(document.querySelector('#hands_state')?.textContent)"
+_DRIVES_OR_LATE: Final = "/You drive|Release all keys/.test(document.querySelector('#hands_state')?.textContent)"
 
 
 class OutOfTimeError(Exception):
@@ -86,7 +86,7 @@ class Hand:
         while len(self._seen) > 1 and self._seen[1][0] <= now_s - _REACTION_S:
             self._seen.popleft()
         known = self._seen[0][1]
-        if "run" in self._held and ("All keys up" in known["hands"] or known["state"] in ("disarmed", "stopped")):
+        if "run" in self._held and ("Release all keys" in known["hands"] or known["state"] in ("disarmed", "stopped")):
             self.drops += 1
             self.arm()
             return self.look()
@@ -107,7 +107,7 @@ class Hand:
                 self._page.raw.click("#reset")
             self._page.wait_for_text("#hands_state", "Ready", _LOST_S)
             keyboard.down("Space")
-            self._page.wait(_DRIVES_OR_LATE, "'You drive' or 'All keys up' in #hands_state", _LOST_S)
+            self._page.wait(_DRIVES_OR_LATE, "'You drive' or 'Release all keys' in #hands_state", _LOST_S)
             drives = "You drive" in self._page.ask(_SEEN)["hands"]
             self.unarmed += not drives
         self._seen.clear()

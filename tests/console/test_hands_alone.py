@@ -171,13 +171,13 @@ def test_driving_begins_on_purpose_and_after_a_rest(browser: Browser) -> None:
         alone.page.raw.focus("#drive")
         keyboard.press("Enter")
         alone.let_pass(0.6)
-        alone.expect("All keys up")
+        alone.expect("Release all keys")
         assert alone.page.text("#hands_rest") == "still 1.0 s", "the second began before the keys were up"
         keyboard.up("KeyW")
         keyboard.up("Space")
         keyboard.down("KeyW")
         alone.let_pass(2.0)
-        alone.expect("All keys up")
+        alone.expect("Release all keys")
         assert not alone.runs, "it ran without a rest"
         keyboard.up("KeyW")
         alone.let_pass(0.62)

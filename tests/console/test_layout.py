@@ -13,7 +13,8 @@ pytestmark = [pytest.mark.console, pytest.mark.processes]
 
 _FOCUSABLE: Final = """() => {
     const all = document.querySelectorAll('a[href], button, input, select, textarea, summary, [tabindex]');
-    return [...all].filter((one) => one.tabIndex >= 0 && !one.disabled && one.checkVisibility({ visibilityProperty: true })).map((one, number) => {
+    const shows = (one) => one.checkVisibility({ visibilityProperty: true });
+    return [...all].filter((one) => one.tabIndex >= 0 && !one.disabled && shows(one)).map((one, number) => {
         one.dataset.reach = number;
         return one.id || one.getAttribute('aria-label') || one.textContent.trim() || one.tagName;
     });

@@ -40,7 +40,7 @@ const triggers = { l2: new Trigger(byId("l2"), "L2"), r2: new Trigger(byId("r2")
 const charts = {
   delay: new Chart(byId("delay_chart"), "delay", "ms", [["to here", "--l2"], ["to the robot", "--r2", [5, 3]]]),
   overlap: new Chart(byId("overlap_chart"), "overlap", "mm³", [["L2", "--l2"], ["R2", "--r2", [5, 3]]]),
-  stiffness: new Chart(byId("stiffness_chart"), "stiffness", "", [["L2", "--l2"], ["R2", "--r2", [5, 3]]], 1),
+  stiffness: new Chart(byId("stiffness_chart"), "met", "of 8", [["L2", "--l2"], ["R2", "--r2", [5, 3]]], 8),
   tick: new Chart(byId("tick_chart"), "robot tick", "µs", [["p50", "--l2"], ["p99", "--r2", [5, 3]]]),
 };
 let open = false; // whether the console is connected
@@ -179,7 +179,7 @@ function showFacts(message) {
   addTo(charts.delay, [facts.to_operator.newest_ms, facts.to_robot.newest_ms]);
   const asked = [["robot", facts.to_robot.asked], ["operator", facts.to_operator.asked]].filter(([, words]) => words);
   charts.delay.said = asked.map(([side, words]) => `emulated to the ${side}: ${words}`).join("; ");
-  addTo(charts.stiffness, [facts.l2.course_stiffness, facts.r2.course_stiffness]);
+  addTo(charts.stiffness, [facts.l2.meets, facts.r2.meets]);
   hands.show(facts);
   showCounts(facts);
 }
@@ -291,7 +291,7 @@ function refresh() {
     const [word, because] = byId("lost").children;
     word.textContent = ended || (open ? (everHeard ? "NOTHING HEARD" : "WAITING FOR THE OPERATOR SIDE") : "CONNECTION LOST");
     const old = everHeard ? `What you see is ${(silentMs / 1000).toFixed(1)} s old. ` : "";
-    because.textContent = ended ? "" : old + (open ? "The operator side is silent." : `The console: ${closedBecause || "not reached yet"}.`);
+    because.textContent = ended ? "" : old + (open ? "Nothing comes from the operator side." : `The console: ${closedBecause || "not reached yet"}.`);
   }
   const limits = facts?.pictures;
   if (replay.open) views.forEach((view) => view.showReplay((replay.untilMs - replay.atMs) / 1000));

@@ -227,7 +227,7 @@ export class Hands {
     if (this.#state !== "watching") {
       this.#factsMs = Math.min(nowMs, this.#factsMs + Math.max(0, passedMs - PERIOD_MS)); // facts may have come that this page has not taken yet
       if (passedMs > HELD_UP_MS) this.#release(`This page was late by ${passedMs.toFixed(0)} ms.`);
-      if (nowMs - this.#factsMs > SILENCE_MS) this.#release("Nothing is heard from the operator side.");
+      if (nowMs - this.#factsMs > SILENCE_MS) this.#release(`Nothing came from the operator side for ${(nowMs - this.#factsMs).toFixed(0)} ms.`);
     }
     const moves = this.#state === "running" && this.#moves;
     const keys = this.#keys.read(passedMs / 1000, moves);

@@ -108,7 +108,7 @@ export class Panel {
     giveBack.hidden = !(hands?.person && facts.hands === InputSource.BROWSER && may && !hands.reset_first);
     this.#text("state", {
       watching: [why, taken, cannot || (taken ? "" : "You are watching.")].filter(Boolean).join(" "),
-      resting: [why, cannot || (hands?.reset_first ? "Reset the stop first." : "All keys up for a second.")].filter(Boolean).join(" "),
+      resting: [why, cannot || (hands?.reset_first ? "Reset the stop first." : "Release all keys for a second.")].filter(Boolean).join(" "),
       ready: cannot || "Ready: hold Space to arm and run.",
       running: hands?.counts < 1 ? `Your keys fade: ${hands.because}.` : moves ? "You drive." : facts?.status.person === Doing.AT_REST_FIRST ? "Release all but hold-to-run." : "Arming: keep holding.",
     }[state]);
@@ -119,8 +119,8 @@ export class Panel {
 
   #aboutStop(stop, facts, hands) {
     if (facts?.status.state === MotionState.STOPPED) {
-      return hands?.reset_first ? "STOPPED."
-        : hands?.may_drive ? "Stopped, and reset." : "STOPPED. The controller arms again.";
+      return hands?.reset_first ? "STOPPED: X resets."
+        : hands?.may_drive ? "The stop was reset: hold Space to arm." : "STOPPED. The controller arms again.";
     }
     if (stop === null) return "";
     if (facts?.status.owner === SessionState.OBSERVING) return "Only the owner can stop the robot: this operator observes.";

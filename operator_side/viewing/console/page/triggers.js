@@ -47,7 +47,7 @@ export class Trigger {
     this.#words[0].classList.toggle("yields", Boolean(yields));
     const mm = facts.needed_m === null ? null : Math.round(1000 * facts.needed_m);
     const ahead = mm === null ? "?" : `${Math.abs(mm)} mm ${mm < 0 ? "behind" : "ahead"}`;
-    const stiffness = facts.course_stiffness === null ? "?" : facts.course_stiffness.toFixed(2);
-    this.#words[1].textContent = `D = ${ahead} · s(δ) = ${stiffness}`;
+    const leads = facts.course_stiffness === null ? "?" : Math.round(STRONGEST * facts.course_stiffness);
+    this.#words[1].textContent = `D = ${ahead} · course leads to ${leads}`;
   }
 }
