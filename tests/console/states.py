@@ -55,7 +55,7 @@ def states(one: Browser) -> Iterator[tuple[str, Page]]:
         fed.state, fed.status = "stopped", {"person": Doing.ALL_KEYS_UP_FIRST}
         page.wait(f"{STATE} == 'stopped'", "shown as stopped")
         yield "stopped", page
-        fed.page = driven
+        fed.page, fed.status = driven, {**fed.status, "stop_reset": True}
         page.wait(f"{STATE} == 'disarmed'", "shown as reset")
         yield "reset", page
         page.raw.click("#replay")
