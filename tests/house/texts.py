@@ -28,7 +28,7 @@ _LITERAL: Final = re.compile(r'"((?:[^"\\\n]|\\.)*)"|`((?:[^`\\]|\\.)*)`')
 _COMMENT: Final = re.compile(r"(?m)^\s*//.*$|(?<=[;,{}\s])// .*$")
 _PLACE: Final = re.compile(r"\$\{[^{}]*(?:\{[^{}]*\}[^{}]*)*\}")
 _NO_TEXT: Final = re.compile(
-    r"#scene|contenteditable|sans-serif|prefers-color|distribution normal|^Hold (and|to) |WEBGL|^IFRAME$|^(gauge|input)\b"
+    r"#scene|contenteditable|sans-serif|prefers-color|distribution normal|^Hold (and|to) |WEBGL|^IFRAME$|^(gauge|input)"
 )
 _ROW: Final = re.compile(r"^\| `(\w+\.js)` \| (.*) \| (.*) \|$", re.MULTILINE)
 _UNKNOWN: Final = "?"
