@@ -5,7 +5,7 @@ from typing import Any, Final
 import pytest
 
 from tests.console.browser import Browser
-from tests.console.pictures_of_page import SIZES
+from tests.console.pictures.page import SIZES
 from tests.console.states import STATES, states
 
 pytestmark = [pytest.mark.console, pytest.mark.processes]

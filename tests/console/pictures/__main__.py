@@ -9,9 +9,9 @@ from typing import Final
 import pytest
 
 from common.errors import FeelaheadError
-from tests.console.film_of_compare import make_compare_film
-from tests.console.picture_of_terminal import make_picture_of_terminal
-from tests.console.pictures_of_page import SIZES, make_first_minute, make_states
+from tests.console.pictures.film_of_compare import make_compare_film
+from tests.console.pictures.page import SIZES, make_first_minute, make_states
+from tests.console.pictures.terminal import make_picture_of_terminal
 from tests.console.states import STATES
 from tests.helpers.repository import ROOT
 

@@ -1,0 +1,1 @@
+"""Pictures and film of the documents: `make pictures`."""
