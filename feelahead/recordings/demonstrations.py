@@ -195,6 +195,7 @@ def _vectors(joined: Joined) -> dict[str, dict[str, str]]:
         vectors["observation.course_stiffness"] = {
             f"{side}_course_stiffness": f"stiffness.{side}.course_stiffness" for side in ("l2", "r2")
         }
+    if "stiffness.r2.fast_m.0" in joined.columns():
         vectors["observation.onset_distances"] = {
             f"{side}_{kind}_{strength + 1}_m": f"stiffness.{side}.{kind}_m.{strength}"
             for side in ("l2", "r2")

@@ -111,7 +111,9 @@ def _walk(kind: inspect.Type, name: str, meaning: str) -> Iterator[Column]:
         case inspect.VarTupleType(item_type=item):
             yield from (one._replace(of=None) for one in _walk(item, f"{name}.#", meaning))
         case _:
-            yield Column(name, _unit(name, kind), _frame(meaning), meaning)
+            slides = re.search(r"; (m(?:etres|/s)?) for a prismatic joint", meaning)
+            other = "" if slides is None else f", {slides[1].replace('metres', 'm')} if prismatic"
+            yield Column(name, _unit(name, kind) + other, _frame(meaning), meaning)
 
 
 def _unit(name: str, kind: inspect.Type) -> str:
@@ -152,7 +154,8 @@ def table_of(columns: Iterable[Column]) -> str:
     for (unit, frame, meaning), alike in groupby(columns, lambda one: one[1:4]):
         names = list(dict.fromkeys(one.shown for one in alike))
         shown = ", ".join(names) if len(names) < _MANY else f"{names[0]} to {names[-1]}"
-        lines.append(f"| {shown} | {unit} | {frame} | {meaning} |")
+        cells = (text.replace("|", "\\|") for text in (shown, unit, frame, meaning))
+        lines.append(f"| {' | '.join(cells)} |")
     return "\n".join(lines)
 
 

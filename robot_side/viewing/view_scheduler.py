@@ -91,7 +91,9 @@ class ViewScheduler:
         self._next_look_s = now_s + _SEEN_TO_S
         owner = self._session.lease.owner
         of = None if owner is None else owner.epoch
-        most_hz, halved, self._scene_hz = self._session.watchers.pace(of, now_s)
+        # What is recorded is made as asked, however slow the page that watches.
+        paced = (math.inf, False, math.inf) if self._always else self._session.watchers.pace(of, now_s)
+        most_hz, halved, self._scene_hz = paced
         if self._cameras is not None:
             control = self._cameras.picture_rate_control
             control.most_hz, control.halved = most_hz, halved

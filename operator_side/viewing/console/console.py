@@ -1,5 +1,7 @@
 """Access of the operator side to its console: a separate process that never blocks this one."""
 
+import contextlib
+import os
 import secrets
 import threading
 from collections import deque
@@ -187,6 +189,10 @@ class Console:
 
 
 def _start(started: list[Companion | OSError]) -> None:
+    # Of this thread alone, so that the new process does not begin with the priority of the side.
+    with contextlib.suppress(OSError):
+        os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
+        os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), 0)
     try:
         started.append(Companion(_MODULE))
     except OSError as error:

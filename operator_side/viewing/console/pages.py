@@ -23,7 +23,7 @@ _A_SECOND: Final = 500
 _TOO_MANY, _NOT_OURS = 1013, 1008
 """WebSocket close codes: try again later; policy violation"""
 
-_RECENT_S: Final = 1.0
+_RECENT_S, _COVERED_S = 1.0, 2.0
 _TAIL: Final = 0.9
 _MOST_AGES: Final = 100
 
@@ -86,6 +86,12 @@ class _Page:
         self._asked_s = None
         self.taken.set()
 
+    def hide(self) -> None:
+        """Expect no answer: a hidden page draws no frames."""
+        self._asked_s = None
+        self._ages_s.clear()
+        self.taken.set()
+
     def late(self, now_s: float) -> tuple[float, float] | None:
         """Return the age of answers, in seconds, that one in ten of the last second exceeds, and the share of pictures
         skipped; None without an answer.
@@ -93,6 +99,8 @@ class _Page:
         ages_s = [age_s for at_s, age_s in self._ages_s if now_s - at_s < _RECENT_S]
         if self._asked_s is not None:
             ages_s.append(now_s - self._asked_s)
+        # One that is covered draws no frames, and says nothing of it: it must not slow the others.
+        ages_s = [age_s for age_s in ages_s if age_s < _COVERED_S]
         if not ages_s:
             return None
         skipped = [skipped for at_s, skipped in self._pictures if now_s - at_s < _RECENT_S]
@@ -203,6 +211,8 @@ class Pages:
                 page.slow = said.slow
             if said.looks is not None and said.looks != page.looks:
                 page.looks = said.looks
+                if not page.looks:
+                    page.hide()
                 self._count()
             if words:
                 self._heard("s", encoded)

@@ -92,7 +92,8 @@ class BrowserHands:
         self._was_armed |= armed
         self._moves |= armed and hands.moves_nothing
         pressed = {Action.RUN}
-        if not armed and (now_s - self._began_s) % (2.0 * _PRESS_S) < _PRESS_S:
+        # An unconfirmed hold may have ended: it keeps the arm armed for a while, but arms nothing.
+        if not armed and self._pages.confirmed and (now_s - self._began_s) % (2.0 * _PRESS_S) < _PRESS_S:
             pressed.add(Action.ARM)
         self._state = self._held(hands, pressed, passed_s)
 

@@ -30,8 +30,8 @@ from operator_side.viewing.pages.pictures import Pictures
 IN_FULL_S, SILENCE_S = 0.15, 0.3
 """Age of unconfirmed inputs up to which they count in full, and from which they move nothing. After `SILENCE_S` without
 any message a page no longer drives, and its emergency stop counts as released."""
-ABSENT_S: Final = 1.0
-"""Age of unconfirmed inputs after which all keys must be up first"""
+ABSENT_S, FROZEN_S = 1.0, 3.0
+"""Age of unconfirmed inputs after which all keys must be up first, and after which another page may drive"""
 _RISE_S: Final = 0.5
 """Time in which inputs count again once they are confirmed, in seconds"""
 REST_S: Final = 1.0
@@ -64,6 +64,8 @@ class DrivingPage:
         """Share of the inputs that counts, as far as the page confirms them"""
         self._latest_s = 0.0
         """Greatest age of unconfirmed inputs since all counted"""
+        self._cause = ""
+        """Words before that age"""
         self.released = ""
         """Why inputs were released without the page's doing, as in HandsFacts"""
         self.pace = PagePace()
@@ -120,8 +122,16 @@ class DrivingPage:
         age_s = self._newest.age_s + now_s - self._heard_s
         share = min(1.0, max(0.0, (SILENCE_S - age_s) / (SILENCE_S - IN_FULL_S)))
         self._confirmed = min(share, self._confirmed + passed_s / _RISE_S)
+        if share < 1.0:
+            repeated = self._newest.age_s > IN_FULL_S
+            self._cause = "this page is late by" if repeated else "nothing came from this page for"
         self._latest_s = 0.0 if self._confirmed == 1.0 else max(self._latest_s, age_s)
         return self._newest
+
+    @property
+    def confirmed(self) -> bool:
+        """Whether the page's drawing thread confirmed the inputs just now, so that they count in full."""
+        return self._confirmed == 1.0
 
     @property
     def counts(self) -> float:
@@ -132,7 +142,7 @@ class DrivingPage:
     def because(self) -> str:
         """Why less than all counts, with what was measured; empty if all counts."""
         if self._confirmed < self.pictures.hands:
-            return f"this page is late by {1e3 * self._latest_s:.0f} ms"
+            return f"{self._cause} {1e3 * self._latest_s:.0f} ms"
         return self.pictures.because
 
     def driven(self, now_s: float) -> bool:
@@ -178,7 +188,7 @@ class DrivingPage:
         return HandsFacts(*known, self.counts, self.reset_first, self.yields, self.because, self.released, *pace)
 
     def _take(self, page: int, hands: PageHands, now_s: float) -> None:
-        if hands.stop:  # even an overtaken one
+        if hands.stop and hands.age_s <= ABSENT_S:  # even an overtaken one; a frozen page repeats it for ever
             self._stop_s = now_s
             self.require_reset()
         if hands.number <= self._numbers.get(page, -1):
@@ -202,7 +212,7 @@ class DrivingPage:
             self._refused.discard(page)
             if page == self._driver:
                 self._let_go()
-        elif self._driver is None and self.may_drive and page not in self._refused:
+        elif self._driver is None and self.may_drive and page not in self._refused and hands.age_s <= IN_FULL_S:
             self._driver = page
             self.doing, self._up_since_s = Doing.ALL_KEYS_UP_FIRST, None
         elif page != self._driver:
@@ -237,10 +247,15 @@ class DrivingPage:
             self.silences += 1
             self.released = f"Nothing came from this page for {1e3 * silent_s:.0f} ms."
             self._let_go()
-        elif self.doing is Doing.RUNNING and (late_s := silent_s + self._newest.age_s) > ABSENT_S:
+        elif (late_s := silent_s + self._newest.age_s) > FROZEN_S or (
+            self.doing is Doing.RUNNING and late_s > ABSENT_S
+        ):
             self.silences += 1
             self.released = f"This page was late by {1e3 * late_s:.0f} ms."
-            self.rest_anew()
+            if late_s > FROZEN_S:
+                self._let_go()
+            else:
+                self.rest_anew()
 
     def _let_go(self) -> None:
         self._driver = self._newest = self._up_since_s = None

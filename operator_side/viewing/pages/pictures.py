@@ -21,6 +21,8 @@ _LEAST_SILENCE_S: Final = 0.5
 _INTERVALS_OLD, _INTERVALS_DEAD = 2.0, 3.0
 _LONGEST_INTERVAL_S: Final = 1.0
 """Longest interval that counts, in seconds: a pause of the robot side is no rate of pictures."""
+_MOST_INTERVAL_S: Final = 0.25
+"""Longest interval that a limit allows for, in seconds: pictures that come more seldom are old, and called so"""
 _FIRST_INTERVAL_S: Final = 1.0 / 30.0
 _OTHER_CLOCK_S: Final = 1.0
 """A picture earlier than the newest by more is of another clock: the robot side has started anew."""
@@ -143,6 +145,8 @@ class Pictures:
         self._views = {name: _View() for name in VIEW_NAMES}
         self._control_p95_s: float | None = None
         self._fades = False
+        self._hid = ""
+        """Words for the motion that was hidden when the hands began to fade"""
         self._measured_s = self._updated_s = -math.inf
 
     def receive(self, payload: bytes, now_s: float) -> None:
@@ -173,8 +177,15 @@ class Pictures:
                 view.look(age_s, now_s)
         if first.state is PictureState.FRESH:
             self._fades = False
-        elif not self._fades:
-            self._fades, self.because = _hide_motion(age_s, None if core.screen is None else core.screen.tool_speed_m_s)
+        elif first.state is PictureState.DEAD:
+            # Also at rest: what would begin to move now would not be seen at all.
+            self._fades, self.because = True, f"no new picture has come for {now_s - first.came_s:.1f} s"
+        else:
+            if not self._fades:
+                speed_m_s = None if core.screen is None else core.screen.tool_speed_m_s
+                self._fades, self._hid = _hide_motion(age_s, speed_m_s)
+            if self._fades:
+                self.because = _age_words(age_s) + self._hid
         change = -passed_s / _FALL_S if self._fades else passed_s / _RISE_S
         self.hands = min(1.0, max(0.0, self.hands + change))
         if self.hands == 1.0:
@@ -201,7 +212,7 @@ class Pictures:
                     video_later_s=self.video_later_s,
                     size_bytes=view.size_bytes,
                     rate_bit_s=None if kbit_s is None else 1e3 * kbit_s,
-                    interval_s=view.interval_s,
+                    interval_s=min(view.interval_s, _MOST_INTERVAL_S),
                 )
                 view.follow(limit_s, passed_s)
 
@@ -209,13 +220,14 @@ class Pictures:
 def _hide_motion(age_s: float | None, speed_m_s: float | None) -> tuple[bool, str]:
     """Return whether pictures of this age hide too much motion, and the words for it. What is unknown counts as too
     much."""
-    if age_s is None:
-        return True, "the pictures' age is unknown"
-    if speed_m_s is None:
-        return True, f"pictures are {1e3 * age_s:.0f} ms old"
+    if age_s is None or speed_m_s is None:
+        return True, ""
     hidden_m = age_s * speed_m_s
-    words = f"pictures are {1e3 * age_s:.0f} ms old, in which the arm goes {1e3 * hidden_m:.0f} mm"
-    return (True, words) if hidden_m > _UNSEEN_M else (False, "")
+    return hidden_m > _UNSEEN_M, f", which hid {1e3 * hidden_m:.0f} mm of motion"
+
+
+def _age_words(age_s: float | None) -> str:
+    return "the pictures' age is unknown" if age_s is None else f"pictures are {1e3 * age_s:.0f} ms old"
 
 
 def _tail(samples_s: Iterable[float], share: float) -> float | None:

@@ -46,5 +46,7 @@ def test_the_document_is_what_the_command_prints(capsys: pytest.CaptureFixture[s
     assert export(["--columns"]) == 0
     printed = capsys.readouterr().out
     assert printed == dictionary(every_table())
+    rows = [line.replace(r"\|", "") for line in printed.splitlines() if line.startswith("|")]
+    assert {row.count("|") for row in rows} == {5}
     document = ROOT / "docs" / "recording" / "columns.md"
     assert document.read_text(encoding="utf-8") == printed, "feelahead export --columns > docs/recording/columns.md"

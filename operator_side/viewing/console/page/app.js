@@ -121,7 +121,13 @@ function show(message, data) {
   else views[message.kind]?.receive(data);
 }
 
+// A real controller is not released here: who holds it must see what is.
+function mayPlayAgain() {
+  return !(facts?.hands === InputSource.CONTROLLER && facts.status.state === MotionState.ARMED);
+}
+
 function playAgain() {
+  if (!replay.has || !mayPlayAgain()) return;
   hands.leave("The last seconds are played again.");
   replay.begin(performance.now());
   stepReplay();
@@ -182,6 +188,9 @@ function showFacts(message) {
   addTo(charts.stiffness, [facts.l2.meets, facts.r2.meets]);
   hands.show(facts);
   showCounts(facts);
+  if (replay.open && !mayPlayAgain()) goLive();
+  replayButton.disabled = !mayPlayAgain();
+  replayButton.title = replayButton.disabled ? "not while a controller drives the armed arm" : "";
 }
 
 function showFelt(message) {
@@ -295,7 +304,7 @@ function refresh() {
   }
   const limits = facts?.pictures;
   if (replay.open) views.forEach((view) => view.showReplay((replay.untilMs - replay.atMs) / 1000));
-  else views.forEach((view, k) => view.showAge(limits?.states[k] ?? null, limits?.old_s[k] ?? null));
+  else views.forEach((view, k) => view.showAge(limits?.states[k] ?? null, limits?.old_s[k] ?? null, limits?.dead_s[k]));
 }
 
 // A late page draws its charts seldom.

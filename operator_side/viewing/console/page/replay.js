@@ -49,7 +49,8 @@ export class Replay {
   begin(nowMs) {
     if (!this.has) return;
     this.open = true;
-    [this.#fromMs, this.untilMs] = [Math.max(this.#oldest()[0][0], nowMs - SPAN_MS), nowMs];
+    this.untilMs = Math.max(...[...this.#kept.values()].map((entries) => entries.at(-1)?.[0] ?? 0));
+    this.#fromMs = Math.max(this.#oldest()[0][0], this.untilMs - SPAN_MS);
     [this.#speed, this.#paused, this.#steppedMs, this.atMs] = [SLOWLY, false, nowMs, this.#fromMs];
     this.#shown.clear();
     this.step(nowMs);

@@ -1,7 +1,9 @@
 // Camera views: the newest picture of each, with its age. The operator side decides whether it is old or dead.
 import { PictureState } from "./names.js";
 
-const DEAD_S = 0.5; // without the operator side's word, as in an old recording
+const DEAD_S = 0.5; // before the operator side's first word
+const SETTLED_MS = 600; // as long must the age be beyond the limit, or within, as for the operator side
+const WORST = [PictureState.FRESH, PictureState.OLD, PictureState.DEAD];
 
 // Estimate of the operator side's clock, from the message with the least delay.
 export class Clock {
@@ -38,6 +40,9 @@ export class View {
   #waiting = null;
   #busy = false;
   #shownMs = -Infinity;
+  #beyond = false;
+  #sinceMs = -Infinity;
+  #old = false;
 
   constructor(place, clock) {
     this.#place = place;
@@ -81,12 +86,17 @@ export class View {
     this.#age.textContent = `REPLAY, ${beforeS.toFixed(1)} s before`;
   }
 
-  // state: of the pictures, as the operator side says; oldS: age from which they are old. Both null while unknown.
-  showAge(state, oldS) {
+  // state: of the pictures, as the operator side says; oldS: age from which they are old; null while unknown. deadS: silence.
+  // The operator side knows of the driving page alone what it shows. So the worse counts of its word and what is seen here.
+  showAge(state, oldS, deadS = DEAD_S) {
     if (this.capturedS === null) return;
     const silentS = (this.#clock.nowMs - this.#shownMs) / 1000;
     const ageS = this.#clock.ageS(this.capturedS);
-    const shown = state ?? (silentS > DEAD_S ? PictureState.DEAD : PictureState.FRESH);
+    const beyond = oldS !== null && ageS !== null && ageS > oldS;
+    if (beyond !== this.#beyond) [this.#beyond, this.#sinceMs] = [beyond, this.#clock.nowMs];
+    if (this.#clock.nowMs - this.#sinceMs >= SETTLED_MS) this.#old = beyond;
+    const here = silentS > deadS ? PictureState.DEAD : this.#old ? PictureState.OLD : PictureState.FRESH;
+    const shown = WORST[Math.max(WORST.indexOf(state), WORST.indexOf(here))];
     const dead = shown === PictureState.DEAD;
     this.#place.dataset.age = shown;
     const ms = (seconds) => Math.max(0, 1000 * seconds).toFixed(0);

@@ -145,6 +145,17 @@ def test_the_arming_button_is_pressed_again_until_the_arm_is_armed_and_never_twi
     assert any(one.arm for one in desk.let_pass(0.1, run=True))
 
 
+def test_an_unconfirmed_hold_arms_nothing() -> None:
+    """The person may have let go while the page drew nothing."""
+    desk = Desk()
+    desk.let_pass(1.1)
+    desk.let_pass(PERIOD_S, run=True)
+    meant = desk.let_pass(0.6, run=True, age_s=0.2)
+    assert all(one.run for one in meant)
+    assert not any(one.arm for one in meant[round(0.1 / TICK_S) :])
+    assert any(one.arm for one in desk.let_pass(1.0, run=True))
+
+
 def test_the_person_lets_go_when_a_page_drives_and_silence_gives_nothing_back() -> None:
     desk = Desk(person=True)
     desk.let_pass(1.4, says=False)

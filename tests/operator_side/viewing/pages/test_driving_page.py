@@ -265,6 +265,25 @@ def test_unconfirmed_inputs_count_less_and_less_then_nothing_and_after_a_second_
     assert pages.doing is Doing.ALL_KEYS_UP_FIRST
 
 
+def test_a_frozen_page_gives_its_seat_and_its_stop_up_and_gets_none(pages: DrivingPage) -> None:
+    """Its worker would repeat them for ever."""
+    frozen, other = TalkingPage(pages), TalkingPage(pages, 2)
+    now_s = running(pages, frozen)
+    frozen.say(now_s, run=True, stop=True, age_s=0.9)
+    assert pages.stopping(now_s)
+    for later_s in (0.2, 0.4):
+        frozen.say(now_s + later_s, run=True, stop=True, age_s=1.0 + later_s)
+    assert not pages.stopping(now_s + 0.4)
+    assert pages.driven(now_s + 0.4)
+    frozen.say(now_s + 0.6, run=True, age_s=3.1)
+    assert not pages.driven(now_s + 0.6)
+    assert pages.released == "This page was late by 3100 ms."
+    frozen.say(now_s + 0.7, run=True, age_s=3.2)
+    assert not pages.driven(now_s + 0.7)
+    other.say(now_s + 0.8, reset=True)
+    assert (pages.driven(now_s + 0.8), pages.reset_first) == (True, False)
+
+
 def test_a_silent_page_moves_ever_less_until_nobody_drives_which_is_said_with_the_time(pages: DrivingPage) -> None:
     start_s = running(pages, TalkingPage(pages))
     shares = []

@@ -143,17 +143,26 @@ def test_hands_are_scaled_and_hold_to_run_stays_the_persons() -> None:
 
 def test_hands_fade_only_where_old_pictures_hide_motion_and_the_words_have_the_numbers() -> None:
     """20 mm: at 10 mm/s that takes two seconds. Hands that have begun to fade return only with fresh pictures."""
-    watched = Watched(0.0, lambda at_s: None if at_s >= 3.0 else 0.0)
+    watched = Watched(0.0, lambda at_s: 0.02 + 0.9 * max(0.0, at_s - 3.0))
     watched.speed_m_s = 0.01
-    assert set(watched.let_pass(4.8)) == {1.0}
-    assert watched.pictures.facts().states == (PictureState.DEAD,) * 2
+    assert set(watched.let_pass(7.0)) == {1.0}
+    assert watched.pictures.facts().states == (PictureState.OLD,) * 2
     assert watched.let_pass(1.0)[-1] == 0.0
-    found = re.fullmatch(r"pictures are (\d+) ms old, in which the arm goes (\d+) mm", watched.pictures.because)
+    found = re.fullmatch(r"pictures are (\d+) ms old, which hid (\d+) mm of motion", watched.pictures.because)
     assert found is not None
-    assert 2000 <= int(found[1]) < 2050
+    assert 2300 <= int(found[1]) < 2500
     assert int(found[2]) == 20
     watched.speed_m_s = 0.0
     assert watched.let_pass(1.0)[-1] == 0.0
+
+
+def test_hands_fade_at_rest_too_once_no_picture_comes() -> None:
+    """What begins to move then would go its whole way unseen."""
+    watched = Watched(0.0, lambda at_s: None if at_s >= 3.0 else 0.0)
+    watched.speed_m_s = 0.0
+    assert set(watched.let_pass(3.4)) == {1.0}
+    assert watched.let_pass(1.2)[-1] == 0.0
+    assert re.fullmatch(r"no new picture has come for 1\.\d s", watched.pictures.because)
 
 
 @pytest.mark.parametrize("slow_s", [0.0, 0.06, 0.11], ids=["a quick machine", "a slow one", "one about the limit"])
@@ -187,6 +196,7 @@ def test_a_state_stays_while_the_link_does(link: str, slow_s: float) -> None:
         if now_s - start_s > 10.0:
             states.append(pictures.facts().states[VIEW_NAMES.index(FIRST)])
     assert sum(before is not after for before, after in pairwise(states)) <= 1
+    assert states[-1] is PictureState.FRESH
 
 
 def _taken_s(mean_s: float, generator: np.random.Generator) -> float:
