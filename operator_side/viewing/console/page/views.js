@@ -2,7 +2,7 @@
 import { PictureState } from "./names.js";
 
 const DEAD_S = 0.5; // before the operator side's first word
-const SETTLED_MS = 600; // as long must the age be beyond the limit, or within, as for the operator side
+const SETTLED_MS = 2000, SILENCES = 3; // what is seen here counts late, as the operator side's word comes sooner
 const WORST = [PictureState.FRESH, PictureState.OLD, PictureState.DEAD];
 
 // Estimate of the operator side's clock, from the message with the least delay.
@@ -95,7 +95,7 @@ export class View {
     const beyond = oldS !== null && ageS !== null && ageS > oldS;
     if (beyond !== this.#beyond) [this.#beyond, this.#sinceMs] = [beyond, this.#clock.nowMs];
     if (this.#clock.nowMs - this.#sinceMs >= SETTLED_MS) this.#old = beyond;
-    const here = silentS > deadS ? PictureState.DEAD : this.#old ? PictureState.OLD : PictureState.FRESH;
+    const here = silentS > SILENCES * deadS ? PictureState.DEAD : this.#old ? PictureState.OLD : PictureState.FRESH;
     const shown = WORST[Math.max(WORST.indexOf(state), WORST.indexOf(here))];
     const dead = shown === PictureState.DEAD;
     this.#place.dataset.age = shown;
