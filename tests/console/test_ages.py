@@ -32,6 +32,17 @@ def test_old_pictures_are_amber_in_a_corner_and_keep_their_colours_and_dead_ones
         page.picture("pictures-dead")
 
 
+def test_a_page_sees_itself_that_its_pictures_stand_still(browser: Browser) -> None:
+    """The operator side hears only of the driving page what it shows."""
+    with fed_page(browser) as (fed, page):
+        page.wait(f"{AGE} == 'fresh'", "fresh")
+        fed.sends, fed.pictures = False, FRESH
+        page.wait_for_text("#overview .dead", "NO NEW PICTURE for")
+        assert page.ask(AGE) == "dead"
+        fed.sends = True
+        page.wait(f"{AGE} == 'fresh'", "fresh again")
+
+
 def test_the_border_says_that_hands_are_off_until_they_count_again(browser: Browser) -> None:
     with fed_page(browser) as (fed, page):
         for counts, words in ((0.4, "hands at 40 %"), (0.0, "hands off")):

@@ -24,6 +24,7 @@ _TOO_MANY, _NOT_OURS = 1013, 1008
 """WebSocket close codes: try again later; policy violation"""
 
 _RECENT_S, _COVERED_S = 1.0, 2.0
+"""Time in seconds whose answers count; and age from which an answer is no lateness: the page's window is covered"""
 _TAIL: Final = 0.9
 _MOST_AGES: Final = 100
 
