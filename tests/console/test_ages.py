@@ -73,6 +73,37 @@ def test_a_page_whose_drawing_is_late_is_heard_by_its_worker_and_says_how_late_i
         assert all(before["number"] < after["number"] for before, after in pairwise(fed.hands))
 
 
+def test_inputs_are_older_by_what_they_waited_for_the_worker(browser: Browser) -> None:
+    """A worker of its own stands for one that is held up: the page's message is a quarter of a second old."""
+    late = """() => {
+      const wire = new Worker("wire.js");
+      wire.postMessage(new URL("live", location.href).href.replace("http", "ws"));
+      wire.onmessage = ({ data }) => {
+        const hands = { page: "late", driving: false, stop: false };
+        if (data.open) wire.postMessage({ words: { hands }, saidMs: performance.timeOrigin + performance.now() - 250 });
+      };
+    }"""
+    with fed_page(browser) as (fed, page):
+        page.ask(late)
+        wait_until("late inputs", lambda: any(one["page"] == "late" for one in list(fed.hands)))
+        assert all(one["age_s"] >= 0.249 for one in fed.hands if one["page"] == "late")
+
+
+def test_a_covered_window_goes_on_and_says_that_nothing_is_drawn(browser: Browser) -> None:
+    with fed_page(browser) as (fed, page):
+        fed.page = msgspec.structs.replace(fed.page, driver=None)
+        fed.state, fed.status = "disarmed", {"person": Doing.READY}
+        page.raw.click("#drive")
+        page.wait_for_text("#hands_state", "Ready")
+        with page.held("Space"):
+            wait_until("hold-to-run", lambda: fed.hands[-1]["run"])
+            page.ask("() => { window.requestAnimationFrame = () => 0; }")
+            page.wait_for_text("#hands_state", "The browser drew nothing of this page for")
+        for target in ("mug", "ball"):
+            fed.status = {"target": target}
+            page.wait_for_text("#target", target)
+
+
 def test_after_a_stop_only_the_reset_lets_hold_to_run_count(browser: Browser) -> None:
     """By the red button and its own reset; neither a rest nor Space is one."""
     with hands_alone(browser) as alone:

@@ -23,8 +23,8 @@ _A_SECOND: Final = 500
 _TOO_MANY, _NOT_OURS = 1013, 1008
 """WebSocket close codes: try again later; policy violation"""
 
-_RECENT_S, _COVERED_S = 1.0, 2.0
-"""Time in seconds whose answers count; and age from which an answer is no lateness: the page's window is covered"""
+_RECENT_S, _FROZEN_S = 1.0, 10.0
+"""Time in seconds whose answers count; and age from which an answer is no lateness: the page has been halted"""
 _TAIL: Final = 0.9
 _MOST_AGES: Final = 100
 
@@ -49,8 +49,9 @@ class Said(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     looks: bool | None = None
     """Whether the page's tab is visible; a hidden tab is sent only lasting messages"""
     taken: bool | None = None
-    """Answer to ROUND_ENDS with the next frame that is drawn: the next batch may follow. Without this answer a slow
-    page would fall behind without limit, as browsers queue all unread messages."""
+    """Answer to ROUND_ENDS: the next batch may follow. True with the next frame that is drawn; False if none is, as the
+    window is covered. Without this answer a slow page would fall behind without limit, as browsers queue all unread
+    messages."""
 
 
 PASSED_ON: Final = ("hands", "tune", "mark", "play", "again")
@@ -68,6 +69,7 @@ class _Page:
         self.looks = True
         self._asked_s: float | None = None
         """Time of the newest batch; None once it is answered"""
+        self._covered = False
         self._ages_s: deque[tuple[float, float]] = deque(maxlen=_MOST_AGES)
         """Times and ages of the newest answers"""
         self._pictures: deque[tuple[float, bool]] = deque(maxlen=_MOST_AGES)
@@ -80,11 +82,12 @@ class _Page:
         self.newest[kind] = message
         self.something.set()
 
-    def answered(self, now_s: float) -> None:
-        """Note an answer to the newest batch."""
-        if self._asked_s is not None:
+    def answered(self, now_s: float, *, drawn: bool) -> None:
+        """Note an answer to the newest batch. drawn: whether it came with a frame; a covered window draws none."""
+        if self._asked_s is not None and drawn:
             self._ages_s.append((now_s, now_s - self._asked_s))
         self._asked_s = None
+        self._covered = not drawn
         self.taken.set()
 
     def hide(self) -> None:
@@ -95,13 +98,14 @@ class _Page:
 
     def late(self, now_s: float) -> tuple[float, float] | None:
         """Return the age of answers, in seconds, that one in ten of the last second exceeds, and the share of pictures
-        skipped; None without an answer.
+        skipped; None without an answer, or if the page's window is covered.
         """
+        if self._covered:
+            return None
         ages_s = [age_s for at_s, age_s in self._ages_s if now_s - at_s < _RECENT_S]
         if self._asked_s is not None:
             ages_s.append(now_s - self._asked_s)
-        # One that is covered draws no frames, and says nothing of it: it must not slow the others.
-        ages_s = [age_s for age_s in ages_s if age_s < _COVERED_S]
+        ages_s = [age_s for age_s in ages_s if age_s < _FROZEN_S]
         if not ages_s:
             return None
         skipped = [skipped for at_s, skipped in self._pictures if now_s - at_s < _RECENT_S]
@@ -207,7 +211,7 @@ class Pages:
                 await connection.close(_NOT_OURS)
                 return
             if said.taken is not None:
-                page.answered(now_s)
+                page.answered(now_s, drawn=said.taken)
             if said.slow is not None:
                 page.slow = said.slow
             if said.looks is not None and said.looks != page.looks:

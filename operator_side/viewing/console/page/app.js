@@ -1,8 +1,10 @@
 // Main script of the page: shows the console's messages as they arrive.
+import { Answers } from "./answers.js";
 import { Chart } from "./charts.js";
+import { makeFigures, showFigures, text } from "./figures.js";
 import { Hands } from "./hands.js";
 import { make } from "./make.js";
-import { InputSource, LinkState, MotionState, ShownKind, VIEWS } from "./names.js";
+import { InputSource, MotionState, ShownKind, VIEWS } from "./names.js";
 import { Overlay } from "./overlay.js";
 import { Player } from "./player.js";
 import { Replay } from "./replay.js";
@@ -14,24 +16,10 @@ const SILENCE_MS = 400; // facts come 30 times a second
 const REFRESH_MS = 100;
 const SELDOM = 10; // refreshes from one drawing of a late page's charts to the next
 const MOST_NOTES = 50;
-const FIGURES = {
-  // figures in the bar: id of the element, and title
-  link: "Link",
-  target: "Target",
-  lease: "Lease",
-  holding: "Holding",
-  whose: "Hands",
-  pictures: "Pictures",
-  delay: "Delay there / back",
-  rate: "Rate / queue / lost",
-};
 const SHOWN = new Set([ShownKind.FACTS, ShownKind.SCENE, ...VIEWS.keys()]); // what can be played again
 const byId = (id) => document.getElementById(id);
 
-for (const [id, title] of Object.entries(FIGURES)) {
-  byId("figures").append(make("div", {}, make("dt", {}, title), make("dd", { id }, "–")));
-}
-
+makeFigures(byId("figures"));
 const clock = new Clock();
 const views = VIEWS.map((name) => new View(byId(name), clock));
 const overlay = new Overlay(VIEWS.map(byId), document.querySelector(".near"));
@@ -58,8 +46,9 @@ let run = { title: "", live: true };
 let ended = ""; // why the connection is expected to end
 
 const wire = new Worker("wire.js");
-const send = (object) => wire.postMessage(object);
-const hands = new Hands(document, send, () => views[0].capturedS);
+const send = (words) => wire.postMessage({ words, saidMs: performance.timeOrigin + performance.now() });
+const answers = new Answers(send);
+const hands = new Hands(document, send, () => views[0].capturedS, () => answers.waits);
 const replay = new Replay((kind, data) => show(typeof data === "string" ? JSON.parse(data) : { kind }, data));
 const replayButton = make("button", { type: "button", id: "replay", onclick: () => (replay.open ? goLive() : playAgain()) });
 byId("player").append(replayButton);
@@ -81,12 +70,6 @@ function connect() {
   wire.postMessage(address.href);
 }
 
-// With the next frame: so the answer's age is the page's lateness, and a late page is sent less.
-function answer() {
-  if (document.hidden) send({ taken: true });
-  else requestAnimationFrame(() => send({ taken: true }));
-}
-
 function take(message, data) {
   receive(message);
   if (run.live && SHOWN.has(message.kind)) replay.keep(message.kind, data, performance.now());
@@ -94,7 +77,7 @@ function take(message, data) {
 }
 
 function receive(message) {
-  if (message.kind === ShownKind.END) answer();
+  if (message.kind === ShownKind.END) answers.answer();
   else if (message.kind === ShownKind.FACTS) showFacts(message);
   else if (message.kind === ShownKind.NOTE) showNote(message.text);
   else if (message.kind === ShownKind.ENDED) ended ||= "THE RUN HAS ENDED";
@@ -154,34 +137,17 @@ function goWithoutFacts(atS) {
   text("why", "the robot side alone · replay");
 }
 
-function text(id, value, bad = false) {
-  const place = byId(id);
-  const shown = value ?? "–";
-  if (place.textContent !== shown) place.textContent = shown;
-  place.classList.toggle("bad", bad);
-  if (place.tagName === "DD") place.title = shown;
-}
-
-const ms = (value) => (value === null ? "?" : value.toFixed(value < 10 ? 1 : 0));
-
 function showFacts(message) {
   heardMs = performance.now();
   everHeard = true;
   facts = message.facts;
   clock.set(facts.now_s, facts.offset_s);
-  const { status } = facts;
   const { said } = message;
   document.body.dataset.state = said.border;
   text("state", said.state);
   byId("state").classList.toggle("long", said.state.length > 9);
   text("why", [...said.why, run.live ? null : "replay"].filter(Boolean).join(" · "));
-  text("link", said.link, status.link !== LinkState.UP);
-  text("lease", said.lease);
-  text("whose", said.whose);
-  text("delay", `${ms(facts.to_robot.mean_ms)} / ${ms(facts.to_operator.mean_ms)} ms`, facts.field_age_ms > 200);
-  showLink(status);
-  text("target", status.target ?? "none");
-  text("holding", said.holding);
+  showFigures(facts, said);
   addTo(charts.delay, [facts.to_operator.newest_ms, facts.to_robot.newest_ms]);
   const asked = [["robot", facts.to_robot.asked], ["operator", facts.to_operator.asked]].filter(([, words]) => words);
   charts.delay.said = asked.map(([side, words]) => `emulated to the ${side}: ${words}`).join("; ");
@@ -214,17 +180,6 @@ function showCounts({ page, hands: whose, status }) {
   byId("hands_off").hidden = !off;
   const share = off && page.counts > 0 ? `hands at ${Math.round(100 * page.counts)} %` : "hands off";
   if (off) text("hands_off", `${share.toUpperCase()}: ${page.because}`);
-}
-
-// Show rate and queueing delay as measured by the robot side, lost packets, and streams that are held back.
-function showLink(status) {
-  const figure = (value, digits = 0) => (value == null ? "?" : value.toFixed(digits));
-  const rate = status.rate_kbit_s == null ? "?" : `${figure(status.rate_kbit_s / 1000, 1)} Mbit/s`;
-  text("rate", `${rate} / ${figure(status.queue_ms)} ms / ${figure(status.lost_percent, 1)} %`, status.queue_ms > 50);
-  const held = status.held_back ? `; held back: ${status.held_back}` : "";
-  const late = facts.page?.fewer ? `; fewer, as ${facts.page.fewer}` : "";
-  text("pictures", `${held ? "held back; " : late ? "fewer; " : ""}${status.pictures ?? "?"}`, Boolean(held || late));
-  byId("pictures").title = `${status.pictures ?? "?"}${held}${late}`;
 }
 
 byId("again").onclick = () => {
@@ -300,7 +255,8 @@ function refresh() {
     const [word, because] = byId("lost").children;
     word.textContent = ended || (open ? (everHeard ? "NOTHING HEARD" : "WAITING FOR THE OPERATOR SIDE") : "CONNECTION LOST");
     const old = everHeard ? `What you see is ${(silentMs / 1000).toFixed(1)} s old. ` : "";
-    because.textContent = ended ? "" : old + (open ? "Nothing comes from the operator side." : `The console: ${closedBecause || "not reached yet"}.`);
+    const silent = answers.waits ? "The browser draws nothing of this page." : "Nothing comes from the operator side.";
+    because.textContent = ended ? "" : old + (open ? silent : `The console: ${closedBecause || "not reached yet"}.`);
   }
   const limits = facts?.pictures;
   if (replay.open) views.forEach((view) => view.showReplay((replay.untilMs - replay.atMs) / 1000));

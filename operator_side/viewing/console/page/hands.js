@@ -46,12 +46,15 @@ export class Hands {
   #why = "";
 
   #shownS;
+  #undrawn;
 
-  // shownS(): capture time of the first view's picture, on the robot side's clock; null without one.
-  constructor(document, send, shownS = () => null) {
+  // shownS(): capture time of the first view's picture, on the robot side's clock; null without one. undrawn(): whether
+  // the next facts wait for the browser to draw this page.
+  constructor(document, send, shownS = () => null, undrawn = () => false) {
     this.#document = document;
     this.#send = send;
     this.#shownS = shownS;
+    this.#undrawn = undrawn;
     this.#panel = new Panel(document, {
       drive: () => (this.#state === "watching" ? this.#begin() : this.#end("You stopped driving.")),
       stop: (held) => this.#stop("pointer", held),
@@ -227,7 +230,8 @@ export class Hands {
     if (this.#state !== "watching") {
       this.#factsMs = Math.min(nowMs, this.#factsMs + Math.max(0, passedMs - PERIOD_MS)); // facts may have come that this page has not taken yet
       if (passedMs > HELD_UP_MS) this.#release(`This page was late by ${passedMs.toFixed(0)} ms.`);
-      if (nowMs - this.#factsMs > SILENCE_MS) this.#release(`Nothing came from the operator side for ${(nowMs - this.#factsMs).toFixed(0)} ms.`);
+      const silentMs = nowMs - this.#factsMs;
+      if (silentMs > SILENCE_MS) this.#release(`${this.#undrawn() ? "The browser drew nothing of this page" : "Nothing came from the operator side"} for ${silentMs.toFixed(0)} ms.`);
     }
     const moves = this.#state === "running" && this.#moves;
     const keys = this.#keys.read(passedMs / 1000, moves);

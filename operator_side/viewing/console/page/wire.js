@@ -34,17 +34,19 @@ function connect() {
   };
 }
 
-// The page says first its console's address, then what it sends.
+// The page says first its console's address, then what it sends, with the time by both threads' common clock: what
+// waited for this thread is that much older.
 onmessage = ({ data }) => {
   if (!address) {
     address = data;
     connect();
-  } else if (data.hands) {
-    inputs = data.hands;
-    confirmedMs = performance.now();
+  } else if (data.words.hands) {
+    inputs = data.words.hands;
+    const nowMs = performance.now();
+    confirmedMs = nowMs - Math.max(0, performance.timeOrigin + nowMs - data.saidMs);
     sayHands();
     inputs = { ...inputs, reset: false, give_back: false }; // pressed once
-  } else send(data);
+  } else send(data.words);
 };
 
 setInterval(() => {

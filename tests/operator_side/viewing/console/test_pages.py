@@ -208,10 +208,16 @@ def test_a_visible_page_is_late_by_the_age_of_its_answers_and_what_it_skips_is_c
             assert skips == pytest.approx(0.9)
             late_s, _ = desk.pages.late(now_s() + 1.0) or (0.0, 0.0)
             assert late_s >= 1.0  # not answered yet
-            assert desk.pages.late(now_s() + 30.0) is None  # covered by another window, it draws no frame
+            assert desk.pages.late(now_s() + 30.0) is None  # halted
             await page.send(TAKEN)
             await a_round(page)
+            await page.send('{"taken":false}')
+            await desk.until(lambda: desk.pages.late(now_s()) is None)  # covered by another window
+            desk.pages.show("facts", "1")
+            await a_round(page)
+            assert desk.pages.late(now_s() + 1.0) is None
             await page.send(TAKEN)
+            await desk.until(lambda: desk.pages.late(now_s()) is not None)
             await page.send('{"looks":false}')
             await desk.until(lambda: desk.counts[-1] == 0)
             assert desk.pages.late(now_s()) is None
