@@ -15,6 +15,7 @@ from common.protocol.view_messages import VIEW_NAMES, VideoFrame, VideoStep, Vie
 from robot_side.drivers.mujoco.scene import Scene
 from robot_side.drivers.mujoco.viewpoints import viewpoints
 from robot_side.viewing.exchange import Order, Picture, Ready, Refusal, Setup, decode_from_companion, encode
+from robot_side.viewing.losses import Losses
 from robot_side.viewing.picture_rate_control import PictureRateControl, Step
 from robot_side.viewing.settings import CamerasSettings
 
@@ -96,6 +97,7 @@ class Cameras:
         """Times that the companion took for the newest pictures, in seconds; at most a thousand"""
         self._whole: dict[ViewName, tuple[int, float]] = {}
         """Number and arrival time of each view's newest whole H.264 picture"""
+        self._losses = Losses()
         self._data = scene.data
         self._note = note
         self._start = start
@@ -128,12 +130,12 @@ class Cameras:
         """Return whether an order of `view` is under way."""
         return view in self._ordered_s
 
-    def makes_h264(self, lacks: tuple[int, int] | None) -> bool:
+    def makes_h264(self, lacks: tuple[int, int] | None, now_s: float) -> bool:
         """Return whether pictures are H.264 for viewers that lack the pictures `lacks` (see `Watch`).
 
-        None means that they show only JPEG.
+        None means that they show only JPEG. Where many are lost, pictures are JPEG, too: each needs no other.
         """
-        return self._h264 and lacks is not None
+        return self._h264 and lacks is not None and not self._losses.many(now_s)
 
     def message(self, picture: Picture, header: Header) -> VideoFrame | VideoStep:
         """Return the message to be published for a picture."""
@@ -210,10 +212,12 @@ class Cameras:
             return
         data = self._data
         mocap = np.concatenate([data.mocap_pos, data.mocap_quat], axis=1).tobytes() if len(data.mocap_pos) else b""
-        step, h264 = self.picture_rate_control.step, self.makes_h264(lacks)
+        step, h264 = self.picture_rate_control.step, self.makes_h264(lacks, now_s)
         number, came_s = self._whole.get(view, (0, -math.inf))
         # A lost picture is newer than the newest whole one.
         lost = lacks is not None and lacks[VIEW_NAMES.index(view)] > number
+        if h264 and lost:
+            self._losses.note(view, number, now_s)
         whole = h264 and lost and now_s - came_s >= _WHOLE_S
         positions = data.qpos.tobytes()
         order = Order(view, captured_s, positions, mocap, step.quality, step.halved, h264, whole)

@@ -153,7 +153,7 @@ class ViewScheduler:
         views = len(looked_at & set(VIEW_NAMES))
         # Recorded pictures are JPEG: replay and export begin anywhere.
         lacks = None if self._always else self._session.watchers.lacks(now_s)
-        h264 = cameras.makes_h264(lacks)
+        h264 = cameras.makes_h264(lacks, now_s)
         cameras.picture_rate_control.update(self._room.left_bit_s, views, now_s, eager=self._room.begins, h264=h264)
         wanted: list[ViewName] = []
         full = self._room.backlog_s("video", now_s) > _BACKLOG_S

@@ -78,6 +78,8 @@ class _View:
         self.state = PictureState.FRESH
         self._newest: deque[tuple[float, float, int]] = deque(maxlen=_MOST_SAMPLES)
         """Time of arrival, interval and bytes of the pictures of the last `_WINDOW_S`"""
+        self._step = -1
+        """Number of the newest step that could be shown"""
         self._look_s = -math.inf
         self._ages = [False, False]
         """Whether this look has seen an age within the limit, and one beyond"""
@@ -89,6 +91,13 @@ class _View:
     @property
     def size_bytes(self) -> int:
         return max((size for *_, size in self._newest), default=0)
+
+    def can_show(self, step: VideoStep) -> bool:
+        """Return whether this step can be shown: a whole picture, or the next one after one that could be."""
+        if not (step.whole or step.number == self._step + 1):
+            return False
+        self._step = step.number
+        return True
 
     def note(self, captured_s: float, size_bytes: int, now_s: float) -> None:
         if 0.0 <= self.captured_s - captured_s < _OTHER_CLOCK_S:
@@ -153,9 +162,10 @@ class Pictures:
         """Take a payload of the topic `video`; an invalid one is ignored."""
         with contextlib.suppress(RemoteProtocolError):
             seen = decode_view(payload)
-            if isinstance(seen, VideoFrame | VideoStep):
-                size_bytes = len(seen.jpeg if isinstance(seen, VideoFrame) else seen.h264)
-                self._views[seen.view].note(seen.captured_s, size_bytes, now_s)
+            if isinstance(seen, VideoFrame):
+                self._views[seen.view].note(seen.captured_s, len(seen.jpeg), now_s)
+            elif isinstance(seen, VideoStep) and self._views[seen.view].can_show(seen):
+                self._views[seen.view].note(seen.captured_s, len(seen.h264), now_s)
 
     def update(self, core: OperatorSide, shown_s: float | None, now_s: float) -> None:
         """Measure, and let the hands fade or return.

@@ -167,6 +167,26 @@ def test_a_whole_picture_is_ordered_once_for_each_that_is_lacking_and_not_too_of
     assert began == [12, 100]
 
 
+def test_where_steps_are_lost_again_and_again_pictures_need_no_other_for_a_while(desk: Desk) -> None:
+    """Also if they are lost again when steps are tried: then they are tried less often."""
+    companion = desk.started()
+    number, steps = 0, []
+    for turn in range(1500):
+        now_s = 0.1 * turn
+        desk.cameras.update(now_s, 0.0, BOTH[:1], (number, 0))  # whatever is sent is lost
+        [order] = desk.orders()
+        number += order.h264
+        steps.append(order.h264)
+        companion.picture(order, b"step" if order.h264 else b"whole", number if order.h264 else 0, whole=order.whole)
+        desk.cameras.update(now_s, 0.0, ())
+    changes = [0.1 * turn for turn in range(1, 1500) if steps[turn] != steps[turn - 1]]
+    began_s, again_s, seldom_s, last_s, *_ = changes
+    assert began_s < 3.0
+    assert again_s - began_s == pytest.approx(30.0, abs=0.2)
+    assert seldom_s - again_s < 3.0
+    assert last_s - seldom_s == pytest.approx(60.0, abs=0.2)
+
+
 def test_nothing_is_ordered_before_the_companion_is_ready(desk: Desk) -> None:
     companion = desk.started()
     companion.channel.receive()

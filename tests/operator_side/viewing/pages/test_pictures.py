@@ -10,7 +10,7 @@ import pytest
 from common.emulation.delay_line import DelayLine
 from common.emulation.spec import LinkSpec, Stream
 from common.protocol.codec import decode_view, encode
-from common.protocol.view_messages import VIEW_NAMES, VideoFrame
+from common.protocol.view_messages import VIEW_NAMES, VideoFrame, VideoStep
 from operator_side.viewing.facts import PictureState
 from operator_side.viewing.pages.pictures import FIRST, Pictures, dead_after_s, old_after_s
 from tests.helpers.messages import telemetry, uniform_update
@@ -208,3 +208,22 @@ def _due(waiting: list[tuple[float, float]], now_s: float) -> list[float]:
     due = [captured_s for due_s, captured_s in waiting if due_s <= now_s]
     waiting[:] = [one for one in waiting if one[0] > now_s]
     return due
+
+
+def test_steps_that_cannot_be_shown_are_no_pictures() -> None:
+    """One is lost: the steps after it come, but nothing new is seen until the next whole picture."""
+    bench, pictures = Bench(), Pictures()
+
+    def come(numbers: range) -> PictureState:
+        for number in numbers:
+            bench.now_s += INTERVAL_S
+            stamp = bench.robot.stamp(bench.now_s)
+            bench.side.receive(encode(uniform_update(bench.robot.stamp(bench.now_s))), bench.now_s)
+            step = VideoStep(stamp, FIRST, bench.now_s, 8, 8, number, number in (1, 80), b"step")
+            pictures.receive(encode(step), bench.now_s)
+            pictures.update(bench.side, None, bench.now_s)
+        return pictures.facts().states[VIEW_NAMES.index(FIRST)]
+
+    assert come(range(1, 40)) is PictureState.FRESH
+    assert come(range(41, 80)) is PictureState.DEAD
+    assert come(range(80, 110)) is PictureState.FRESH
