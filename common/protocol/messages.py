@@ -94,9 +94,9 @@ class MotionCommand(Message, frozen=True, tag="motion"):
     r2: float
     """Calibrated travel of the right trigger, 0 to 1."""
     lateral: Vector2 = (0.0, 0.0)
-    """Left stick, right and up positive, -1 to 1 each."""
+    """Left stick, in the controller frame: right and up positive, -1 to 1 each."""
     turning: Vector2 = (0.0, 0.0)
-    """Right stick, right and up positive, -1 to 1 each."""
+    """Right stick, in the controller frame: right and up positive, -1 to 1 each."""
     gripper: float = 0.0
     """Motion of the gripper's fingers: -1 opens, +1 closes, 0 holds."""
     run: bool = False
@@ -216,15 +216,15 @@ class TriggerField(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_
     """Advances from here along the trigger at which strengths 1 to 8 begin, for slow zones, whose commanded speed is so
     low that touching the target is allowed."""
     full_speed_m_s: float
-    """v_max: speed that a full pull commands in this pose."""
+    """v_max: speed along the trigger's direction that a full pull commands in this pose."""
     acceleration_m_s2: float
     """a: acceleration along the trigger's direction that the joints are sure to reach in this pose."""
     displacement_m: float
     """δ along the trigger, as the robot side computes it: v t_d (eq. 8); v_max t_d while the commands under way are
     unknown."""
     course_stiffness: float
-    """Stiffness s(δ) to which the present course leads, by `fast_m` after the advance `displacement_m`, 0 to 1; not
-    what the trigger meets now."""
+    """Stiffness s(δ) to which the present course along the trigger leads, by `fast_m` after the advance
+    `displacement_m`, 0 to 1; not what the trigger meets now."""
 
     def __post_init__(self) -> None:
         rising("fast_m", self.fast_m)
@@ -243,7 +243,7 @@ class StiffnessUpdate(Message, frozen=True, tag="stiffness"):
     speed_m_s: float
     """v: speed of the gripper along R2's direction."""
     horizon_m: float
-    """Horizon of both fields."""
+    """Horizon of both fields, along each trigger."""
     rumble: float
     """Rumble, 0 to 1 in eighths: strength in the direction of the stick; 0 while the stick rests."""
     state: MotionState
@@ -286,7 +286,7 @@ class Telemetry(Message, frozen=True, tag="telemetry", array_like=False):
     tool_speed_m_s: _Far
     """Speed of the tool, in any direction"""
     gripper_opening_m: Annotated[float, Meta(ge=0.0, le=10.0)]
-    """Free gap between the fingers; 0 without a gripper"""
+    """Free gap between the fingers, along the jaws' motion; 0 without a gripper"""
     holding: bool
     """Whether an object is between the fingers"""
     enlargement_m: _Far
@@ -296,9 +296,9 @@ class Telemetry(Message, frozen=True, tag="telemetry", array_like=False):
     r2_course_stiffness: Share
     """Stiffness s(δ) to which the present course along R2 leads, 0 to 1"""
     base_turn_rad: _Turn = 0.0
-    """Angle across the approach axis from the tool's right to the base's, positive towards the tool's up"""
+    """Angle in the tool frame, across the approach axis, from the tool's right to the base's; positive towards up"""
     camera_turn_rad: _Turn = 0.0
-    """Angle across the approach axis from the tool's right to the right of the overview's picture, signed alike"""
+    """Angle in the tool frame, across the approach axis, from the tool's right to that of the overview; same sign"""
     camera_faces: bool = False
     """Whether the tool faces the overview's camera, so that up in the picture lies clockwise of right"""
     undone: Share = 0.0

@@ -141,9 +141,9 @@ class EnlargementTerms(msgspec.Struct, frozen=True, array_like=True, forbid_unkn
     kinematic_sd_m: float
     """Standard deviation of the arm's estimate along the trigger, √(ûᵀΣû) (eq. 5-7)"""
     camera_sd_m: float
-    """Standard deviation of the camera's error, σ_c (eq. 1-2)"""
+    """Standard deviation of the camera's error, σ_c, the same in any direction (eq. 1-2)"""
     prediction_sd_m: float
-    """Standard deviation of the prediction of δ, σ_δ"""
+    """Standard deviation of the prediction of δ along the trigger, σ_δ"""
     quantile: float
     """Quantile Φ⁻¹(P) of the standard normal distribution (eq. 10)"""
     loop_age_s: float

@@ -76,9 +76,9 @@ class RobotStatus(SideStatus, frozen=True, kw_only=True):
     nearest: str | None = None
     """Nearest object that is not a support"""
     nearest_mm: float | None = None
-    """Distance from the gripper's surface to the nearest object"""
+    """Distance, in any direction, from the gripper's surface to the nearest object"""
     target_mm: float | None = None
-    """Distance from the gripper's surface to the target"""
+    """Distance, in any direction, from the gripper's surface to the target"""
     tick_us: float | None = None
     """Median duration of the ticks since the previous status; None unless the side runs in its own process, like the
     next five"""
@@ -120,7 +120,7 @@ class OperatorStatus(SideStatus, frozen=True, kw_only=True):
     r2_free: float | None = None
     """Calibrated travel of R2 at which its first stiff zone begins, 0 to 1"""
     target_centre_mm: float | None = None
-    """Distance from the point between the fingertips to the target's centre"""
+    """Distance, in any direction, from the point between the fingertips to the target's centre"""
     holding: bool | None = None
     """Whether an object is between the fingers"""
     stop_reset: bool = False

@@ -25,7 +25,10 @@ _UNITS: Final = {
     **{"_mm3": "mm³", "_mm": "mm", "_ms": "ms", "_us": "µs", "_m": "m", "_s": "s"},
 }
 """Unit by the end of a column's name; the first that fits counts"""
-_FRAME: Final = re.compile(r"in the (\w+) frame|along (R2's direction|the trigger|the motion|L2|R2)\b")
+_FRAME: Final = re.compile(
+    r"in the (\w+) frame|along (R2's direction|the trigger|each trigger|the motion|the jaws' motion|L2|R2)\b"
+    r"|in (any direction)"
+)
 _NUMBER: Final = re.compile(r"(?<=\.)\d+(?=\.|$)")
 _OBJECT: Final = "OBJECT"
 _MANY: Final = 3
@@ -40,7 +43,7 @@ class Column(NamedTuple):
     unit: str
     """Unit; 1 for a number without one, "0 or 1" for a truth value, "text" for a text"""
     frame: str
-    """Frame or direction of a position, a direction or a motion; empty for other values"""
+    """Frame or direction of a length, an angle or a motion; empty for other values"""
     meaning: str
     of: int | None = 1
     """Number of columns; None if it depends on the recording"""
@@ -128,7 +131,7 @@ def _unit(name: str, kind: inspect.Type) -> str:
 
 def _frame(meaning: str) -> str:
     found = _FRAME.search(meaning)
-    return "" if found is None else found[1] or found[2]
+    return "" if found is None else found[1] or found[2] or found[3]
 
 
 def dictionary(tables: Iterable[tuple[str, Iterable[str]]]) -> str:
@@ -163,7 +166,8 @@ _HEAD: Final = f"""# Columns
 
 Each table has the column `{TIME}`, in seconds: the time since the recording began. An empty value is unknown. A unit of
 1 is a number without unit. Numbers at the end of names count from 0. Equations and sections are the paper's.
-What a trigger meets now is `meets`; what the present course leads to, s(δ), is `course_stiffness`."""
+What a trigger meets now is `meets`; what the present course leads to, s(δ), is `course_stiffness`.
+Every length, speed and angle has the frame of its coordinates, or the direction along which it counts."""
 _ABOUT_JOINED: Final = """\
 The newest values of the other tables at each time. A column is named after its table: `stiffness.r2.course_stiffness`
 is `r2.course_stiffness` of `stiffness`."""

@@ -13,7 +13,7 @@ class ArmRow(msgspec.Struct, frozen=True):
     velocity_rad_s: tuple[float, ...]
     """Velocity of each joint, in the joint frame, as its drive estimates it; m/s for a prismatic joint"""
     gripper_opening_m: float
-    """Free gap between the fingers; 0 without a gripper"""
+    """Free gap between the fingers, along the jaws' motion; 0 without a gripper"""
     gripper_holding: bool
     """Whether an object between the fingers stopped them while they were commanded to close"""
 

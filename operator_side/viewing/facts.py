@@ -29,14 +29,15 @@ class TriggerFacts(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     free: float
     """Calibrated travel, 0 to 1, at which the first zone with a strength above 0 begins"""
     course_stiffness: float | None
-    """Stiffness s(δ) of §4.2 to which the present course leads, by the robot side, 0 to 1; None without a field. What
-    the trigger meets now is `meets`"""
+    """Stiffness s(δ) of §4.2 to which the present course along the trigger leads, by the robot side, 0 to 1; None
+    without a field. What the trigger meets now is `meets`"""
     needed_m: float | None
-    """Distance D_z (`feel/zones.py`) that must be felt ahead at the present travel; None without a field"""
+    """Distance D_z (`feel/zones.py`) that must be felt ahead at the present travel, along the trigger; None without a
+    field"""
     fast_m: tuple[float, ...]
-    """Onset distances of the eight strengths, for fast zones (45 mm/s or more); empty without a field"""
+    """Onset distances of the eight strengths along the trigger, for fast zones (45 mm/s or more); empty if unknown"""
     slow_m: tuple[float, ...]
-    """Onset distances of the eight strengths, for slow zones (below 45 mm/s); empty without a field"""
+    """Onset distances of the eight strengths along the trigger, for slow zones (below 45 mm/s); empty if unknown"""
 
 
 class DelayFacts(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

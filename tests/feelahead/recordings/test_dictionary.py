@@ -10,11 +10,12 @@ EVERY = [(table, column) for table in KINDS for column in columns_of(table).valu
 
 
 @pytest.mark.parametrize(("table", "column"), EVERY, ids=[f"{table}.{column.name}" for table, column in EVERY])
-def test_every_column_has_a_unit_and_a_meaning_and_a_position_its_frame(table: str, column: Column) -> None:
+def test_every_column_has_a_unit_and_a_meaning_and_a_length_or_direction_its_frame(table: str, column: Column) -> None:
     assert column.unit
     assert column.meaning, f"{table}.{column.name}: write a text below the field"
-    if column.of == 3:
-        assert column.frame, f"{table}.{column.name}: say in which frame"
+    directed = column.of in (2, 3) and column.unit == "1"
+    if directed or column.unit.partition(",")[0] in ("m", "mm", "mm³", "m/s", "m/s²", "rad", "rad/s"):
+        assert column.frame, f"{table}.{column.name}: say in which frame, or along what"
 
 
 @pytest.mark.parametrize(
@@ -22,7 +23,7 @@ def test_every_column_has_a_unit_and_a_meaning_and_a_position_its_frame(table: s
     [
         ("telemetry", "tool_position_m.2", "m", "world", "Estimated position"),
         ("stiffness", "r2.fast_m.7", "m", "the trigger", "strengths 1 to 8"),
-        (JOINED, "stiffness.r2.course_stiffness", "1", "", "not what the trigger meets now"),
+        (JOINED, "stiffness.r2.course_stiffness", "1", "the trigger", "not what the trigger meets now"),
         (JOINED, "controller.r2_meets", "1", "", "what the finger feels now"),
         ("overlap", "a cup.0.r2_mm3", "mm³", "R2", "eq. 11-12"),
         ("operator_facts", "status.R2_pulled", "1", "", "travel of R2"),
