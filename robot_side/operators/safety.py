@@ -215,7 +215,7 @@ class Safety:
                 self._handle(SessionEvent.HEALTHY, now_s)
         if pressed:
             self._handle(SessionEvent.ARM, now_s)
-            why = held or f"press again after {self.settings.healthy_s:g} s without faults"
+            why = held or f"keep all inputs at rest for {self.settings.healthy_s:g} s, then press again"
             self._handle(SessionEvent.ARM_EARLY, now_s, f"{NOT_ARMED}: {why}")
 
     def _healthy_for_long(self, now_s: float) -> bool:

@@ -37,9 +37,12 @@ def check_permission(*, is_root: bool, rules: Mapping[str, str], controllers: Se
     if is_root:
         return Finding(name, Verdict.OK, "not needed, as you are root; the command below is for other users", remedy)
     denied = any("no permission" in seen.said for seen in controllers)
-    opened = f"lets you open {', '.join(missing)}; plug the controller in again after it"
     verdict = Verdict.MISSING if denied else Verdict.NOTE
-    return Finding(name, verdict, f"none in {RULE_FILE} or elsewhere {opened}", remedy)
+    said = (
+        f"no rule in {RULE_FILE} or elsewhere lets you open {', '.join(missing)}; "
+        "after the command below, plug the controller in again"
+    )
+    return Finding(name, verdict, said, remedy)
 
 
 def missing_grants(rules: Mapping[str, str]) -> list[str]:

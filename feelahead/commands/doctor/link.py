@@ -147,9 +147,11 @@ class _Questions:
     def expect_telemetry(self) -> None:
         """Raise PathError unless telemetry arrives at the view connection."""
         if not self._until(_TELEMETRY_LIMIT_S + 2.0 * self._round_trip_s, lambda: self._telemetry):
-            place = host_and_port(self._address.view)
-            said = f"{place} is no view port of a robot side, or not of this one: it sends no telemetry"
-            raise PathError("view port", f"the control port works, but {said}", VIEW_CONNECT)
+            said = (
+                f"the control port works, but {host_and_port(self._address.view)} is no view port of a robot side, "
+                "or not of this one: it sends no telemetry"
+            )
+            raise PathError("view port", said, VIEW_CONNECT)
 
     def expect_large(self) -> None:
         """Raise PathError unless a question is answered that was sent behind packets of full size."""
@@ -159,7 +161,7 @@ class _Questions:
         # Both questions fit in 2.5 s: after 3 s without a heartbeat the robot side would hang up, and a new connection
         # would have no large packet in its way.
         if not any(self._ask() and self._answered(_LARGE_LIMIT_S / 2) for _ in range(2)):
-            said = f"small packets reach {self._place}, large ones do not: the path drops too long packets"
+            said = f"small packets reach {self._place}, large ones do not: the path drops packets of full size"
             remedy = "a smaller MTU here, such as: sudo ip link set DEVICE mtu 1280 (VPNs and tunnels need that)"
             raise PathError("large packets", said, remedy)
 
@@ -170,16 +172,21 @@ class _Questions:
         if self._sockets.key_refused:
             said = f"the robot side at {place} does not let this key in: it was never allowed there, or was revoked"
             return PathError(
-                "our key", said, f"run there: feelahead keys allow NAME {public_part(self._address.keys.secret)}"
+                "our key",
+                said,
+                f"run on the robot's machine: feelahead keys allow NAME {public_part(self._address.keys.secret)}",
             )
-        said = f"the program at {place} has another key than --robot-key says, or is no such port of a robot side"
-        remedy = "--robot-key with the key that this shows on the robot's machine: feelahead keys show robot"
+        said = f"the program at {place} has another key than --robot-key says, or is no robot side's control port"
+        remedy = "give --robot-key the key that this shows on the robot's machine: feelahead keys show robot"
         return PathError("robot key", said, remedy)
 
     def _no_answer(self) -> PathError:
-        said = f"{self._place} speaks ZeroMQ and does not answer: a robot side that is starting or paused, its view"
-        remedy = "wait until it listens (its first start compiles for a minute), and give its control port"
-        return PathError("no answer", f"{said} port, or another program", remedy)
+        said = (
+            f"{self._place} speaks ZeroMQ and does not answer: "
+            "a robot side that is starting or paused, its view port, or another program"
+        )
+        remedy = "wait until it listens (its first start compiles for some ten seconds), and give its control port"
+        return PathError("no answer", said, remedy)
 
     def _ask(self) -> bool:
         """Send a command without lease and session, which the robot side answers but never applies.

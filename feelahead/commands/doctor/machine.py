@@ -77,7 +77,7 @@ def check_kernels(facts: KernelFacts | None) -> list[Finding]:
         return [Finding("kernels", Verdict.OK, f"{facts.kernels} compiled for this processor, in {facts.folder}")]
     said, remedy = "the first start compiles them, in some ten seconds", COMPILE
     if not facts.writable:
-        said = f"{facts.folder} cannot keep them: each start compiles for about a minute"
+        said = f"{facts.folder} cannot keep them: each start compiles for some ten seconds"
         remedy = f"let this user write to {facts.folder}, or set NUMBA_CACHE_DIR to another folder; then: {COMPILE}"
     missing = f"{facts.missing} of {facts.kernels} are not compiled for this processor"
     return [Finding("kernels", Verdict.NOTE, f"{missing}: {said}", remedy)]
@@ -140,7 +140,7 @@ def _facts(kernels: Sequence["Compiled"]) -> KernelFacts:
 def rendering_troubles() -> dict[str, str | None]:
     """Try each off-screen backend in a separate process; return why it fails, or None if it works."""
     outputs = {backend: _output_of(_RENDER, backend) for backend in BACKENDS}
-    ended = "the trial crashes, or takes too long"
+    ended = "a trial picture crashes, or takes too long"
     return {backend: ended if said is None else json.loads(said) for backend, said in outputs.items()}
 
 

@@ -62,7 +62,7 @@ def judge_port(address: RobotAddress, port: Endpoint, opening: Opening, *, loopb
     place = host_and_port(port)
     if opening.error is not None:
         raise _no_connection(address, port, opening.error, loopback=loopback)
-    see_who = f"give the robot side's port; the program at this one is shown there by: ss -ltnp 'sport = :{port.port}'"
+    see_who = f"give the robot side's port; this shows there what listens at this one: ss -ltnp 'sport = :{port.port}'"
     match mechanism_of(opening.said), address.keys is not None:
         case ("NULL", False) | ("CURVE", True):
             return
@@ -73,12 +73,12 @@ def judge_port(address: RobotAddress, port: Endpoint, opening: Opening, *, loopb
             remedy = f"start it with --keys FOLDER ({_STEPS}), or leave --keys out if anyone may move the arm"
             raise PathError("keys", f"the robot side at {place} runs without keys, and --keys was given", remedy)
     if opening.said:
-        said = f"at {place} is something that begins with {opening.said[:24]!r}, and no robot side"
+        said = f"{place} is no robot side's: what listens there begins with {opening.said[:24]!r}"
     elif opening.hung_up:
         said = (
-            f"{place} takes connections and hangs up at once: a forwarded port with nothing behind it, or a robot side"
+            f"{place} takes connections and hangs up at once: "
+            "a forwarded port with nothing behind it, or a robot side with too many connections"
         )
-        said += " with too many connections"
         see_who = "start the robot side behind it, or end the program that keeps connecting"
     else:
         said = f"{place} takes connections and says nothing: no robot side, or a paused one"
@@ -100,17 +100,23 @@ def _no_connection(address: RobotAddress, port: Endpoint, error: int, *, loopbac
     if error == errno.ECONNREFUSED:
         remedy = f"start feelahead-robot, or say where it is: --connect tcp://ROBOT:{port.port}"
         if not loopback:
-            remedy = f"start feelahead-robot there with --bind tcp://0.0.0.0:{port.port} and --keys FOLDER: without"
-            remedy += " --bind it listens on its own loopback alone"
+            remedy = (
+                f"start feelahead-robot there with --bind tcp://0.0.0.0:{port.port} and --keys FOLDER: "
+                "without --bind it listens on its own loopback alone"
+            )
         return PathError("closed port", f"{place} refuses connections: nothing listens there", remedy)
     if error == errno.ETIMEDOUT:
         ports = list(dict.fromkeys(str(each.port) for each in (address.control, address.view)))
-        said = f"{place} gave no answer in {_CONNECT_LIMIT_S:g} s: a firewall drops the packets, or no machine has"
-        remedy = (
-            f"let TCP ports {' and '.join(ports)} in on the robot's machine, such as: sudo ufw allow proto tcp from"
+        said = (
+            f"{place} gave no answer in {_CONNECT_LIMIT_S:g} s: "
+            "a firewall drops the packets, or no machine has that address"
         )
-        remedy += f" any to any port {','.join(ports)}; whether it is on: ping {port.host}"
-        return PathError("firewall", f"{said} that address", remedy)
+        remedy = (
+            f"let TCP ports {' and '.join(ports)} in on the robot's machine, "
+            f"such as: sudo ufw allow proto tcp from any to any port {','.join(ports)}; "
+            f"whether it is on: ping {port.host}"
+        )
+        return PathError("firewall", said, remedy)
     reason = {
         errno.EHOSTUNREACH: "no machine has that address, no router knows a way, or a firewall rejects it",
         errno.ENETUNREACH: "this machine is in no network from which it can be reached",

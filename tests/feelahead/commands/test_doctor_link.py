@@ -152,7 +152,7 @@ def http_server() -> Iterator[str]:
         (closed, LONG_S, "closed port: 127.0.0.1:"),
         (listening, SHORT_S, "takes connections and says nothing"),
         (lambda: listening(accept=True), LONG_S, "hangs up at once"),
-        (http_server, LONG_S, "something that begins with b'<!DOCTYPE HTML"),
+        (http_server, LONG_S, "what listens there begins with b'<!DOCTYPE HTML"),
     ],
 )
 def test_a_stranger_at_the_port(

@@ -31,7 +31,7 @@ def test_the_operator_reads_which_held_input_keeps_the_arm_from_being_armed(held
     bench.drive(0.05, operator)
     bench.drive(0.02, operator, arm=True)
     because = bench.robot.status(bench.now_s).stopped_because
-    assert because == "not armed: press again after 0.1 s without faults"
+    assert because == "not armed: keep all inputs at rest for 0.1 s, then press again"
     bench.arm_it(operator)
     assert bench.robot.status(bench.now_s).stopped_because is None
 
