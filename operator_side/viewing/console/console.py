@@ -74,6 +74,9 @@ class Console:
         self._again_s: float | None = None
         """Time to start another process; None while one runs or starts"""
         self._started: list[Companion | OSError] = []
+        self._starting: threading.Thread | None = None
+        """Thread that starts another process, or has done so"""
+        self._closed = threading.Event()
         self._companion = Companion(_MODULE)
         self._runs = False
         """Whether a process runs whose end has not been noted"""
@@ -151,7 +154,8 @@ class Console:
         if self._again_s is not None and now_s >= self._again_s:
             self._again_s = None
             # In a thread, as starting a process takes milliseconds.
-            threading.Thread(target=_start, args=(self._started,), daemon=True).start()
+            self._starting = threading.Thread(target=_start, args=(self._started, self._closed), daemon=True)
+            self._starting.start()
         if self._started:
             started = self._started.pop()
             if isinstance(started, OSError):
@@ -182,13 +186,21 @@ class Console:
         return taken
 
     def close(self) -> None:
-        """Tell the pages that the run has ended, and end the console process; kill it if that takes over 0.3 s."""
+        """Tell the pages that the run has ended, and end the console process; kill it after `_END_LIMIT_S`.
+
+        A process that is just being started ends, too: here, or after the same time by the thread that starts it.
+        """
+        self._closed.set()
         self._companion.channel.send(b"d", b"")
         self._companion.channel.flush()
         self._companion.close(_END_LIMIT_S)
+        if self._starting is not None:
+            self._starting.join(_END_LIMIT_S)
+        _end_all(self._started)
 
 
-def _start(started: list[Companion | OSError]) -> None:
+def _start(started: list[Companion | OSError], closed: threading.Event) -> None:
+    """Start another console process; end it at once if the console was closed meanwhile."""
     # Of this thread alone, so that the new process does not begin with the priority of the side.
     with contextlib.suppress(OSError):
         os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
@@ -197,3 +209,13 @@ def _start(started: list[Companion | OSError]) -> None:
         started.append(Companion(_MODULE))
     except OSError as error:
         started.append(error)
+    if closed.is_set():
+        _end_all(started)
+
+
+def _end_all(started: list[Companion | OSError]) -> None:
+    """Kill the processes that nobody has taken: the thread that starts one and `close` may both try."""
+    with contextlib.suppress(IndexError):
+        while True:
+            if isinstance(one := started.pop(), Companion):
+                one.close(0.0)
