@@ -38,6 +38,8 @@ class Fed:
     """Changes to the status"""
     scene: dict[str, Any] = field(default_factory=dict)
     """Changes to the scene's state"""
+    whose: InputSource = InputSource.BROWSER
+    """Whose inputs move the arm"""
     page: HandsFacts = field(default_factory=lambda: HandsFacts(True, "page", False, "", None, yields=(False, True)))
     """Facts for the page; a page that asks to drive is the driver"""
     pictures: PictureFacts = FRESH
@@ -72,7 +74,7 @@ class Fed:
                 assert isinstance(sways, SceneState)
                 console.view(encode(replace(sways, **self.scene)), video=False)
                 if self.tells:
-                    told = {"hands": InputSource.BROWSER, "page": page, "status": status, "pictures": self.pictures}
+                    told = {"hands": self.whose, "page": page, "status": status, "pictures": self.pictures}
                     console.facts(replace(made, **told))
                 for view in VIEW_NAMES if self.sends else ():
                     console.view(pictures.frame(view, now_s, step, now_s - self.age_s), video=True)

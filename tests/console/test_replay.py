@@ -5,6 +5,7 @@ from typing import Final
 import pytest
 from msgspec.structs import replace
 
+from common.status.codes import InputSource
 from tests.console.browser import Browser
 from tests.console.fed_page import AGE, fed_page
 from tests.console.hands_alone import served
@@ -93,3 +94,21 @@ def test_a_replay_releases_the_hands_and_leaves_state_and_stop_live(browser: Bro
         page.wait(f"{AGE} == 'replay'", "once more")
         page.raw.click("#drive")
         page.wait(f"{AGE} == 'fresh'", "live as soon as it drives")
+
+
+def test_nothing_is_played_again_while_a_controller_drives_the_armed_arm(browser: Browser) -> None:
+    """Who holds the controller must see what is; nothing here releases it."""
+    locked = "document.querySelector('#replay').disabled"
+    with fed_page(browser) as (fed, page):
+        page.raw.click("#replay")
+        page.wait(f"{AGE} == 'replay'", "played again beside a page that drives")
+        fed.whose = InputSource.CONTROLLER
+        page.wait(f"{AGE} == 'fresh' && {locked}", "live as soon as a controller drives")
+        assert page.ask("document.querySelector('#replay').title") == "not while a controller drives the armed arm"
+        # As a click that was under way would.
+        page.ask("document.querySelector('#replay').onclick()")
+        assert not page.ask("document.body.classList.contains('again')")
+        fed.state = "disarmed"
+        page.wait(f"!{locked}", "allowed again")
+        page.raw.click("#replay")
+        page.wait(f"{AGE} == 'replay'", "played again beside a disarmed arm")
