@@ -123,6 +123,17 @@ def test_the_slowest_viewer_decides_rate_and_size_of_pictures_and_the_scenes_rat
     assert table.looking.pictures == {"rate_hz": 30.0, "quality": 75, "size": 1.0}
 
 
+def test_what_is_recorded_keeps_its_own_rate_and_size_beside_a_late_page() -> None:
+    table = Table(always=tuple(ALL))
+    table.watch(**ALL, picture_hz=5.0, halved=True, scene_hz=5.0)
+    table.run(3.0)
+    assert table.looking.pictures == {"rate_hz": 30.0, "quality": 75, "size": 1.0}
+    views = Counter(frame.view for frame in table.frames())
+    assert all(80 <= count <= 91 for count in views.values())
+    assert len(table.states()) >= 80
+    assert {(frame.width, frame.height) for frame in table.frames()} == {(640, 480)}
+
+
 def test_the_same_link_shows_whole_size_in_h264_and_another_codec_begins_where_its_bytes_say() -> None:
     table = Table(left_bit_s=150e3, link=LinkSpec.parse("video: rate 150kbit"))
     table.watch(overview=True, first_person=True, lacks=(0, 0))
