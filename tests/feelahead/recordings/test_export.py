@@ -187,6 +187,22 @@ def test_lerobot_says_how_old_pictures_are_and_how_many_there_are(
     assert (np.diff(ages_s)[~again] < 0.0).all()
 
 
+def test_a_recording_with_the_former_name_of_s_is_exported_without_it(run: Recording, tmp_path: Path) -> None:
+    path = tmp_path / "older.mcap"
+    file = RecordingFile(path, 0.0)
+    Content(file).write(0, HEADER + as_json({"side": "robot", **run.headers["robot"]}))
+    for message in run.messages(("/stiffness", "/command", "/robot/inputs", "/operator/inputs")):
+        time_s = 1e-9 * (message.log_ns - run.began_ns)
+        file.write(message.topic, time_s, message.content.replace(b'"course_stiffness"', b'"stiffness"'))
+    file.close()
+    older = open_recording(path)
+    assert "stiffness.r2.stiffness" in read_tables(older).joined().columns()
+    folder = exported(older, "lerobot", tmp_path / "older")
+    features = {*json.loads((folder / "meta/info.json").read_text())["features"]}
+    assert "observation.course_stiffness" not in features
+    assert {"observation.onset_distances", "observation.meets", "observation.felt"} <= features
+
+
 def operators(path: Path, *frames: tuple[float, float | None, VideoFrame]) -> Recording:
     """Record frames at an operator side alone, each at its time, with the clock's offset that is known by then."""
     file = RecordingFile(path, 0.0)
