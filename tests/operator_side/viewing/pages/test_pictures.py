@@ -112,6 +112,17 @@ def test_a_page_that_shows_them_late_counts_as_old_too() -> None:
     assert watched.let_pass(1.5)[-1] == 1.0
 
 
+@pytest.mark.parametrize("delay_s", [0.0, 0.02, 0.1, 0.3])
+def test_pictures_that_come_once_a_second_are_old_and_never_fresh_though_they_come_in_time(delay_s: float) -> None:
+    watched = Watched(delay_s, lambda at_s: delay_s if round(at_s / INTERVAL_S) % 20 == 0 else None)
+    watched.let_pass(15.0)
+    states = set()
+    for _ in range(500):
+        watched.let_pass(TICK_S)
+        states.add(watched.pictures.facts().states[VIEW_NAMES.index(FIRST)])
+    assert states == {PictureState.OLD}
+
+
 def test_another_clock_of_a_robot_side_started_anew_is_followed_and_what_is_broken_passed_over() -> None:
     pictures, bench = Pictures(), Bench()
     for captured_s in (500.0, 500.05, 3.0, 3.05):
