@@ -231,7 +231,8 @@ export class Hands {
       this.#factsMs = Math.min(nowMs, this.#factsMs + Math.max(0, passedMs - PERIOD_MS)); // facts may have come that this page has not taken yet
       if (passedMs > HELD_UP_MS) this.#release(`This page was late by ${passedMs.toFixed(0)} ms.`);
       const silentMs = nowMs - this.#factsMs;
-      if (silentMs > SILENCE_MS) this.#release(`${this.#undrawn() ? "The browser drew nothing of this page" : "Nothing came from the operator side"} for ${silentMs.toFixed(0)} ms.`);
+      const silence = silentMs.toFixed(0);
+      if (silentMs > SILENCE_MS) this.#release(this.#undrawn() ? `The browser drew nothing of this page for ${silence} ms.` : `Nothing came from the operator side for ${silence} ms.`);
     }
     const moves = this.#state === "running" && this.#moves;
     const keys = this.#keys.read(passedMs / 1000, moves);
