@@ -8,8 +8,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-RESERVOIR_SIZE = 100_000
-"""Number of samples kept for quantiles, so that 400 s of turns of 4 ms are exact; of more, a uniform random choice is
+RESERVOIR_SIZE = 50_000
+"""Number of samples kept for quantiles, so that 200 s of turns of 4 ms are exact; of more, a uniform random choice is
 kept."""
 BLOCK = 512
 """Number of samples that are processed together."""
