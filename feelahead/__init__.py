@@ -1,0 +1,69 @@
+"""feelahead: networked teleoperation in which the operator feels what is ahead.
+
+These names are for scripts; docs/python.md shows them at work. Each is imported when it is first used, so a machine
+needs only what it uses.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, Final
+
+if TYPE_CHECKING:
+    from common.link_model import DelayLine, LinkProfile
+    from feelahead.both_sides.episode import Episode
+    from feelahead.both_sides.history import Contact, History
+    from operator_side.controller.port import Controller
+    from operator_side.people.port import FingerInput, Person, Seen
+    from robot_side import overlap as overlaps
+    from robot_side.arm.port import Arm
+    from robot_side.enlargement import enlargement_distance
+    from robot_side.laws.inputs import LawInputs
+    from robot_side.laws.law import Law
+    from robot_side.surroundings.perceived import ObjectSource
+
+_PLACES: Final = {
+    "Arm": "robot_side.arm.port",
+    "Contact": "feelahead.both_sides.history",
+    "Controller": "operator_side.controller.port",
+    "DelayLine": "common.link_model",
+    "Episode": "feelahead.both_sides.episode",
+    "FingerInput": "operator_side.people.port",
+    "History": "feelahead.both_sides.history",
+    "Law": "robot_side.laws.law",
+    "LawInputs": "robot_side.laws.inputs",
+    "LinkProfile": "common.link_model",
+    "ObjectSource": "robot_side.surroundings.perceived",
+    "Person": "operator_side.people.port",
+    "Seen": "operator_side.people.port",
+    "enlargement_distance": "robot_side.enlargement",
+    "overlaps": "robot_side.overlap",
+}
+"""Module of each name; `overlaps` is the module itself"""
+
+__all__ = [  # made by __getattr__
+    "Arm",
+    "Contact",
+    "Controller",
+    "DelayLine",
+    "Episode",
+    "FingerInput",
+    "History",
+    "Law",
+    "LawInputs",
+    "LinkProfile",
+    "ObjectSource",
+    "Person",
+    "Seen",
+    "enlargement_distance",
+    "overlaps",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _PLACES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}; valid: {', '.join(__all__)}")
+    module = import_module(_PLACES[name])
+    return module if name == "overlaps" else getattr(module, name)
+
+
+def __dir__() -> list[str]:
+    return __all__

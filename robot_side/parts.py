@@ -39,7 +39,8 @@ from robot_side.drivers.remote.driver_session import ArmShape
 from robot_side.drivers.remote.frame_message import perceived
 from robot_side.gripper.held_covers import HeldCovers
 from robot_side.gripper.kept_covers import SearchNotes
-from robot_side.laws.named import LAWS
+from robot_side.laws.inputs import LawInputs
+from robot_side.laws.named import make_law
 from robot_side.operators.episodes import Episodes
 from robot_side.operators.operator_session import OperatorSession
 from robot_side.operators.safety import Safety
@@ -84,12 +85,13 @@ def build_parts(
     scene: Scene | None = None,
     announce: Callable[[str], None] | None = None,
     drivers: ConnectedDrivers | None = None,
+    law: object = None,
 ) -> SceneParts:
     """Make the parts; ConfigurationError for a model that cannot be used.
 
     scene: used instead of the scene that the settings name. announce: called with each note as soon as it is known, so
     that those about the model come before a long search. drivers: the connected drivers, whose arm and objects replace
-    the simulated ones.
+    the simulated ones. law: used instead of the law that the settings name (see `OwnLaw`).
     """
     if (settings.model is None) != (settings.site is None):
         given, missing = ("--model", "--site") if settings.site is None else ("--site", "--model")
@@ -120,13 +122,9 @@ def build_parts(
     surroundings = Surroundings()
     prediction, prediction_note = settings.prediction_for(scene.robot.fingerprint)
     errors = settings.uncertainty(prediction)
-    law = LAWS[settings.law](
-        errors,
-        np.full(arm.joint_count, encoder.standard_deviation_rad()),
-        joint_limits,
-        settings.motion,
-        surroundings,
-    )
+    encoder_sigma_rad = np.full(arm.joint_count, encoder.standard_deviation_rad())
+    inputs = LawInputs(errors, encoder_sigma_rad, joint_limits, settings.motion, surroundings)
+    law = make_law(settings.law if law is None else law, inputs)
     link = settings.seed, settings.asymmetry_s(), settings.tick_period_s()
     late = *prediction_note, *_cover_notes(kinematics.cover, settings.cover_m, held_covers)
     for text in late:

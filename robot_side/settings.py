@@ -16,7 +16,7 @@ from robot_side.drivers.mujoco.built_in_scenes import SceneName
 from robot_side.drivers.mujoco.robot_model import SiteAxis
 from robot_side.enlargement.distance import Uncertainty, Vector3
 from robot_side.enlargement.prediction_errors import BUILT_IN, PredictionErrors, load_prediction_errors
-from robot_side.laws.named import LawName
+from robot_side.laws.named import require_name
 from robot_side.operators.safety import SafetySettings
 from robot_side.viewing.settings import CamerasSettings
 
@@ -99,9 +99,9 @@ class RobotSettings(SideOptions):
     """Scene of the built-in arm. table (the default): a cluttered table. wall: a wall 10 to 60 mm behind the target.
     slot: two posts on the way, with 15 to 40 mm of clearance on each side. shelf: a shelf with a raised front edge to
     reach over. The last three are drawn from the seed."""
-    law: LawName = "swept"
+    law: Annotated[str, tyro.conf.arg(metavar="NAME|FILE.py")] = "swept"
     """Law from which stiffness follows. swept: stiffness along the direction of each trigger, early enough to release
-    the trigger in time. paper: the paper's plain law, for comparison."""
+    the trigger in time. paper: the paper's plain law, for comparison. FILE.py: a law of your own (docs/python.md)."""
     assist: Assist = "none"
     """Help besides stiffness, which a strong finger can overcome. speed: the robot side limits the speed along the
     triggers, so that the arm stops where full strength is due, however hard the finger pulls."""
@@ -140,6 +140,7 @@ class RobotSettings(SideOptions):
             raise ValueError(
                 "--insecure and --keys exclude each other, as keys decide who may connect; valid: only one of them"
             )
+        require_name(self.law)
         self.uncertainty(PredictionErrors())
 
     def uncertainty(self, prediction: PredictionErrors) -> Uncertainty:

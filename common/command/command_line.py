@@ -7,7 +7,7 @@ import io
 import re
 import signal
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar, get_type_hints
 
@@ -82,11 +82,19 @@ def load_toml(path: Path, settings_type: type[Settings], elsewhere: str = "", fl
         raise ConfigurationError(f"{flag} {path}: cannot be read: {error.strerror}") from error
     except ValueError as error:
         raise ConfigurationError(f"{flag} {path}: {error}") from error
-    _refuse_unknown_keys(content, settings_type, f"{flag} {path}", "", elsewhere)
+    return settings_of(content, settings_type, f"{flag} {path}", elsewhere)
+
+
+def settings_of(content: Mapping[str, Any], settings_type: type[Settings], place: str, elsewhere: str = "") -> Settings:
+    """Make settings from their fields by name; raises ConfigurationError, which names place, field and valid values.
+
+    Nested settings may be mappings or instances.
+    """
+    _refuse_unknown_keys(content, settings_type, place, "", elsewhere)
     try:
         return msgspec.convert(content, settings_type, dec_hook=_from_toml)
     except msgspec.ValidationError as error:
-        raise ConfigurationError(f"{flag} {path}: {explain(str(error), content, settings_type)}") from error
+        raise ConfigurationError(f"{place}: {explain(str(error), content, settings_type)}") from error
 
 
 def run_command(program: str, command: Callable[[Sequence[str]], int]) -> None:
@@ -124,7 +132,7 @@ def run_command(program: str, command: Callable[[Sequence[str]], int]) -> None:
 
 def _from_toml(kind: type, value: object) -> object:
     """Convert a value to a type that TOML lacks."""
-    if kind is Path and isinstance(value, str):
+    if kind is Path and isinstance(value, str | Path):
         return Path(value)
     raise TypeError(f"Expected `{kind.__name__}`, got `{type(value).__name__}`")
 
@@ -136,7 +144,9 @@ def _config_path(arguments: Sequence[str]) -> str | None:
     return path
 
 
-def _refuse_unknown_keys(content: dict[str, Any], settings_type: Any, file: str, prefix: str, elsewhere: str) -> None:
+def _refuse_unknown_keys(
+    content: Mapping[str, Any], settings_type: Any, file: str, prefix: str, elsewhere: str
+) -> None:
     # A file that a file names is not read.
     hints = {name: hint for name, hint in get_type_hints(settings_type).items() if name != "config"}
     for key, value in content.items():

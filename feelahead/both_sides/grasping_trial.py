@@ -8,23 +8,19 @@ from typing import Any, Final, Literal
 
 from common.emulation.clauses import LinkModel
 from common.periods import TURN
-from common.protocol.around import Around
 from common.protocol.uniform_field import uniform_field
 from common.roles import Role
-from feelahead.both_sides.loopback import Loopback, LoopbackSettings, robot_parts
+from feelahead.both_sides.episode import GRASPING, Episode
 from feelahead.both_sides.not_placed import why_not_placed
 from operator_side.controller.feel import MAX_STRENGTH
-from operator_side.dualsense.simulated.trigger_model import zone_of
 from operator_side.people.person import SimulatedOperator
 from operator_side.people.settings import PersonSettings
 from operator_side.settings import OperatorSettings
-from robot_side.arm.port import GripperPose
 from robot_side.drivers.mujoco.built_in_scenes import SceneName
 from robot_side.drivers.mujoco.ground_truth import GroundTruth
 from robot_side.drivers.mujoco.robot_model import SiteAxis
-from robot_side.drivers.mujoco.scene import load_scene
 from robot_side.drivers.mujoco.true_contact import TrueContact
-from robot_side.laws.law import Law
+from robot_side.laws.inputs import LawInputs
 from robot_side.outcome.placing import Placing
 from robot_side.settings import CameraSettings, RobotSettings
 from robot_side.tick.events import Listener
@@ -68,25 +64,16 @@ class Trial:
 
 
 class _Silent:
-    """Replacement for the law in trials without haptics, which computes nothing."""
+    """Law of trials without haptics, which computes nothing."""
 
-    def __init__(self, law: Law) -> None:
-        self._law = law
+    def __init__(self, inputs: LawInputs) -> None:
+        del inputs
 
     def sense(self, situation: Situation, now_s: float) -> Sensed:
         """Return the field of two free triggers."""
         del situation, now_s
         free = uniform_field(0)
         return Sensed(l2=free, r2=free)
-
-    def around(self, pose: GripperPose) -> Around | None:
-        """Return None: there is no map of the surroundings."""
-        del pose
-        return None
-
-    def summary(self) -> dict[str, int]:
-        """Return the summary of the replaced law, which counts no work."""
-        return self._law.summary()
 
 
 class Watch(Listener):
@@ -99,9 +86,6 @@ class Watch(Listener):
         self.pulled_s = self.full_s = 0.0
         """Time for which R2 was pulled, and for which the finger met full strength at R2, in seconds"""
         self.placing = Placing()
-        self.scene = load_scene(trial.model, trial.site, name=trial.scene, seed=seed, site_axis=trial.site_axis)
-        self._contact, self.truth = TrueContact(self.scene), GroundTruth(self.scene)
-        self._parts = {self.scene.model.geom(geom).name for geom in self.scene.robot.gripper_geoms}
         self._hit_s: dict[str, float] = {}
         self._next_s = -math.inf
         robot = RobotSettings(
@@ -124,12 +108,13 @@ class Watch(Listener):
             haptics=trial.arm != "off",
             person=trial.person if trial.arm == "reacting" else replace(trial.person, trust=0.0),
         )
-        parts = robot_parts(robot, self.scene)
-        self.loopback = Loopback(
-            LoopbackSettings(robot, operator),
-            parts=replace(parts, law=_Silent(parts.law)) if trial.arm == "off" else parts,
-            listeners=[self],
+        silent = _Silent if trial.arm == "off" else None
+        self.episode = Episode(
+            robot=robot, operator=operator, law=silent, person=GRASPING, listeners=[self], sampled=False
         )
+        self.loopback, self.scene = self.episode.loop, self.episode.scene
+        self._contact, self.truth = TrueContact(self.scene), GroundTruth(self.scene)
+        self._parts = {self.scene.model.geom(geom).name for geom in self.scene.robot.gripper_geoms}
 
     def on_sent(self, now_s: float) -> None:
         """Sample the true contacts, the strength under the finger, and the target's position."""
@@ -164,8 +149,7 @@ class Watch(Listener):
     def strength_of(self, trigger: int) -> int | None:
         """Return the strength of the zone that the trigger has reached; None for a trigger that is not pulled."""
         device = self.loopback.device
-        travel = device.travel[trigger]
-        return device.strengths[trigger][zone_of(travel)] if travel > 0.0 else None
+        return device.strength[trigger] if device.travel[trigger] > 0.0 else None
 
 
 def run_trial(trial: Trial, seed: int, sample: Callable[[Watch], None] = lambda _: None) -> dict[str, Any]:

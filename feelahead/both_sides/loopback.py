@@ -4,8 +4,6 @@ Events happen exactly when they are due, in order of time, so that the same sett
 numbers on every machine.
 """
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 from common.clock import MonotonicClock, VirtualClock
@@ -15,22 +13,15 @@ from common.emulation.tuned import tuned_link
 from common.protocol.messages import Telemetry
 from common.statistics import RunningStatistics, microseconds
 from feelahead.both_sides.summary import merge_summaries
-from operator_side import events as operator_events
-from operator_side.assembly import build_operator_side
 from operator_side.controller.connection import Connection
 from operator_side.controller.port import OpenController
 from operator_side.controller.search import Ready
+from operator_side.core import OperatorSide
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
-from operator_side.people.simulated_hands import simulated_hands
 from operator_side.settings import OperatorSettings
 from operator_side.viewing.pages.driving_page import DrivingPage
-from robot_side.compiled.warm_up import warm_up
-from robot_side.core.robot_parts import RobotParts
 from robot_side.core.robot_side import RobotSide
-from robot_side.drivers.mujoco.scene import Scene
-from robot_side.parts import SceneParts, build_parts
 from robot_side.settings import RobotSettings
-from robot_side.tick import events as robot_events
 
 _WALL = MonotonicClock()
 """Real clock, only to measure how long ticks take."""
@@ -38,19 +29,6 @@ _PEER = b"loopback"
 VIRTUAL_CLOCK = "virtual"
 _STREAMS: tuple[Stream, ...] = ("haptics", "telemetry")
 """Streams to the operator side; pictures and scene are left out, as nobody watches views here."""
-
-
-@dataclass(frozen=True)
-class LoopbackSettings:
-    """Settings of each side; the two may differ in links, seeds and durations."""
-
-    robot: RobotSettings = field(default_factory=RobotSettings)
-    operator: OperatorSettings = field(default_factory=OperatorSettings)
-
-
-def robot_parts(settings: RobotSettings, scene: Scene | None = None) -> SceneParts:
-    """Make the robot side's parts for a virtual clock, in `scene` or else in the scene that the settings name."""
-    return build_parts(settings, 1, VIRTUAL_CLOCK, scene)
 
 
 class Person(Protocol):
@@ -65,43 +43,25 @@ class Loopback:
 
     def __init__(
         self,
-        settings: LoopbackSettings,
-        *,
-        parts: RobotParts | None = None,
-        device: SimulatedDualSense | None = None,
-        person: Callable[[SimulatedDualSense], Person] | None = None,
+        robot: RobotSide,
+        operator: OperatorSide,
+        device: SimulatedDualSense,
+        person: Person,
+        robot_settings: RobotSettings,
+        operator_settings: OperatorSettings,
         pages: DrivingPage | None = None,
-        listeners: Sequence[robot_events.Listener] = (),
-        operator_listeners: Sequence[operator_events.Listener] = (),
     ) -> None:
-        """parts: the robot side's parts, instead of those that the settings give (see `robot_parts`).
+        """device: the controller, which the person holds. The settings have links, seeds and the turns' periods.
 
-        device: the simulated controller; a new one if None. person: makes the person who holds it; the scripted person
-        if None. pages: the console's pages, from which an emergency stop or tuning may come.
-        listeners, operator_listeners: receive the events of the robot side's and the operator side's core.
+        pages: the console's pages, from which an emergency stop or tuning may come.
         """
         self.clock = VirtualClock()
-        self.robot = RobotSide(parts or robot_parts(settings.robot), listeners)
-        # After the scene was loaded, as it decides which kernels are imported.
-        warm_up()
-        self.operator = build_operator_side(settings.operator, 2, VIRTUAL_CLOCK, operator_listeners)
-        self.device = device or SimulatedDualSense()
-        self.connection = Connection(Ready(OpenController(self.device, "simulated DualSense")), self.operator)
+        self.robot, self.operator, self.device, self.person = robot, operator, device, person
+        self.connection = Connection(Ready(OpenController(device, "simulated DualSense")), operator)
         self.pages = pages or DrivingPage(may_drive=False)
-        self.person: Person = (
-            person(self.device)
-            if person is not None
-            else simulated_hands(
-                self.device,
-                settings.operator.person,
-                settings.operator.seed,
-                settings.operator.calibration,
-                swap_sides=settings.operator.swap_sides,
-            )
-        )
-        self._tick_s, self._motion_s = settings.robot.tick_period_s(), settings.operator.tick_period_s()
-        self.tick_time = RunningStatistics(settings.robot.seed)
-        self._there, self._back = settings.operator.link_spec(), settings.robot.link_spec()
+        self._tick_s, self._motion_s = robot_settings.tick_period_s(), operator_settings.tick_period_s()
+        self.tick_time = RunningStatistics(robot_settings.seed)
+        self._there, self._back = operator_settings.link_spec(), robot_settings.link_spec()
         self._to_robot: DelayLine[bytes] = DelayLine(self._there.profile("to_robot"))
         self._to_operator: dict[Stream, DelayLine[bytes]] = {
             stream: DelayLine(self._back.profile("to_operator", stream)) for stream in _STREAMS

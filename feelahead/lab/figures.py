@@ -1,6 +1,6 @@
 """Draw figures with matplotlib without a screen, so that the same data give the same file to the byte."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final
@@ -17,6 +17,13 @@ LAW_COLOURS: Final = {
     "none": "#777777",
     "full": "#009e73",
 }
+_OTHER_COLOURS: Final = ("#cc79a7", "#e69f00", "#000000", "#f0e442")
+
+
+def colour_of(law: str, laws: Sequence[str]) -> str:
+    """Return the colour of one of the `laws` that are drawn together."""
+    others = [one for one in laws if one not in LAW_COLOURS]
+    return LAW_COLOURS[law] if law in LAW_COLOURS else _OTHER_COLOURS[others.index(law) % len(_OTHER_COLOURS)]
 
 
 @contextmanager

@@ -9,7 +9,6 @@ import functools
 import json
 import sys
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -19,7 +18,8 @@ from common.command.command_line import run_command
 from operator_side.core import OperatorSide
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.main import command
-from operator_side.people.pulling_hands import PullingHands, constant_force
+from operator_side.people.arming_hands import ArmingHands
+from operator_side.people.port import FingerInput, Pulling
 
 _FORCE_N: Final = 2.0
 _CYCLE_S: Final = 3.0
@@ -29,18 +29,14 @@ _AT_ONCE_S: Final = 0.002
 """Time from the arrival of a field to a write, within which the field is the write's cause, in seconds"""
 
 
-_FREE: Final[Any] = constant_force(0.0)(0.0)
-"""Input of a finger that does not pull; its class has had other names"""
-
-
-def pulled(aside: bool, since_s: float) -> Any:
+def pulled(aside: bool, since_s: float) -> FingerInput:
     """Return a pull of R2 and then one of L2; aside: with the left stick to the right and then to the left."""
     there = since_s % _CYCLE_S < _CYCLE_S / 2.0
     r2_n, l2_n = (_FORCE_N, 0.0) if there else (0.0, _FORCE_N)
-    return replace(_FREE, r2_n=r2_n, l2_n=l2_n, left_stick=((_ASIDE if there else -_ASIDE) if aside else 0.0, 0.0))
+    return FingerInput(r2_n=r2_n, l2_n=l2_n, left_stick=((_ASIDE if there else -_ASIDE) if aside else 0.0, 0.0))
 
 
-class Resting(PullingHands):
+class Resting(ArmingHands):
     """Person who only holds the controller."""
 
     def tick(self, now_s: float, screen: Any, delay_s: float) -> None:
@@ -82,9 +78,9 @@ def main(arguments: Sequence[str]) -> int:
     others = [word for word in arguments if not word.startswith(("--drives=", "--log="))]
     drives, delays = own["drives"], Delays()
 
-    def hands(device: SimulatedDualSense, *_: Any, **__: Any) -> PullingHands:
-        kind = Resting if drives == "rest" else PullingHands
-        return kind(device, functools.partial(pulled, drives == "aside"))
+    def hands(device: SimulatedDualSense, *_: Any, **__: Any) -> ArmingHands:
+        kind = Resting if drives == "rest" else ArmingHands
+        return kind(device, Pulling(functools.partial(pulled, drives == "aside")))
 
     if drives != "task":
         setattr(operator_side.controllers, "simulated_hands", hands)  # noqa: B010

@@ -2,11 +2,11 @@
 
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.hands.travel_calibration import TravelCalibration
+from operator_side.people.arming_hands import ArmingHands, constant_force
 from operator_side.people.person import SimulatedOperator
-from operator_side.people.pulling_hands import PullingHands, constant_force
 from operator_side.people.settings import PersonSettings
 
-SimulatedHands = SimulatedOperator | PullingHands
+SimulatedHands = SimulatedOperator | ArmingHands
 
 
 def simulated_hands(
@@ -19,5 +19,5 @@ def simulated_hands(
 ) -> SimulatedHands:
     """Make the scripted person that `settings` select, at the controller `device`."""
     if settings.pull_n is not None:
-        return PullingHands(device, constant_force(settings.pull_n))
+        return ArmingHands(device, constant_force(settings.pull_n))
     return SimulatedOperator(device, settings, seed, calibration, swap_sides=swap_sides)

@@ -1,11 +1,18 @@
-"""Laws by name, each imported on first use. To add a law, add its file and one entry here."""
+"""Laws by name, each imported on first use. To add a law here, add its file and one entry.
+
+Other laws come from installed packages, and from files: see `common.plugged`.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any, Final, Literal, Protocol
+from collections.abc import Callable, Collection, Mapping
+from typing import TYPE_CHECKING, Final, Protocol, cast
+
+from common.errors import ConfigurationError
+from common.plugged import find, known
 
 if TYPE_CHECKING:
+    from robot_side.laws.inputs import LawInputs
     from robot_side.laws.law import Law
     from robot_side.tick.explained import Explains
 
@@ -16,22 +23,40 @@ if TYPE_CHECKING:
             """Set the probability P of eq. 10; ConfigurationError outside (0, 1)."""
 
 
-LawName = Literal["swept", "paper"]
-"""swept: onset distances along each trigger. paper: the paper's own law (§4.2), one stiffness for both triggers."""
-
-
-def _swept(*arguments: Any) -> NamedLaw:
+def _swept(inputs: LawInputs) -> NamedLaw:
     from robot_side.laws.swept import SweptLaw  # noqa: PLC0415
 
-    return SweptLaw(*arguments, maps=True)
+    return SweptLaw(inputs, maps=True)
 
 
-def _paper(*arguments: Any) -> NamedLaw:
+def _paper(inputs: LawInputs) -> NamedLaw:
     from robot_side.laws.paper import PaperLaw  # noqa: PLC0415
 
-    return PaperLaw(*arguments)
+    return PaperLaw(inputs)
 
 
-LAWS: Final[Mapping[LawName, Callable[..., NamedLaw]]] = {"swept": _swept, "paper": _paper}
-"""Factory of each law. Its arguments: uncertainty, standard deviations of the encoders (n,) in rad, joint limits,
-motion settings, surroundings."""
+LAWS: Final[Mapping[str, Callable[[LawInputs], NamedLaw]]] = {"swept": _swept, "paper": _paper}
+"""Built-in laws. swept: onset distances along each trigger. paper: the paper's own law (§4.2), one stiffness for both
+triggers."""
+
+
+def make_law(law: object, inputs: LawInputs) -> NamedLaw:
+    """Make a law from its name, a file or an object (see `OwnLaw`); ConfigurationError if that is no law."""
+    given = find_law(law) if isinstance(law, str) else law
+    if given in LAWS.values():
+        return cast("Callable[[LawInputs], NamedLaw]", given)(inputs)
+    from robot_side.laws.own import OwnLaw  # noqa: PLC0415
+
+    return OwnLaw(law if isinstance(law, str) else type(law).__name__, given, inputs)
+
+
+def require_name(name: str, built_in: Collection[str] = LAWS) -> None:
+    """Raise ConfigurationError unless `name` is a known law or a file; no file is read, and nobody's code is run."""
+    if name not in built_in and not name.endswith(".py") and name not in (others := known("law")):
+        names = ", ".join([*built_in, *others])
+        raise ConfigurationError(f"law {name!r}: there is no such law; valid: {names}, or a file such as ./mine.py")
+
+
+def find_law(name: str) -> object:
+    """Return what makes the law with this name, or of this file; ConfigurationError for an unknown one."""
+    return find("law", name, LAWS)

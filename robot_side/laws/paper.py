@@ -10,20 +10,14 @@ from typing import Final
 
 import numpy as np
 
-from common.arrays import FloatArray, IntArray
+from common.arrays import FloatArray
 from common.protocol.around import Around
-from common.protocol.uniform_field import FAR_M, STRENGTHS, uniform_field
 from common.protocol.view_messages import EnlargementTerms
-from common.roles import Role
-from robot_side.arm.ability import JointLimits, along_approach
 from robot_side.arm.port import GripperPose
-from robot_side.arm.tool_motion import ToolMotionSettings
-from robot_side.enlargement.distance import Uncertainty, plain_enlargements_m
+from robot_side.enlargement.distance import plain_enlargements_m
 from robot_side.enlargement.kinematic_error import position_covariance
-from robot_side.field.object_class import OBSTACLE, SKIPPED
-from robot_side.field.total_overlap import total_overlap_m3
 from robot_side.laws.explanation import moved_and_inflated, overlaps_by_object
-from robot_side.surroundings.surroundings import Surroundings
+from robot_side.laws.inputs import LawInputs, everything_but_held
 from robot_side.tick.explained import Trigger, TriggerExplained
 from robot_side.tick.sensed import Sensed
 from robot_side.tick.situation import Situation
@@ -37,21 +31,11 @@ PERIOD_S: Final = 0.01
 class PaperLaw:
     """The paper's law. It computes a result every PERIOD_S and returns this result in between."""
 
-    def __init__(
-        self,
-        uncertainty: Uncertainty,
-        encoder_sigma_rad: FloatArray,
-        limits: JointLimits,
-        motion: ToolMotionSettings,
-        surroundings: Surroundings | None = None,
-    ) -> None:
-        """encoder_sigma_rad (n,): σ_θ of eq. 3. surroundings: owner of the perceived scene; a new one by default."""
-        self.surroundings = surroundings or Surroundings()
+    def __init__(self, inputs: LawInputs) -> None:
+        """Take the arm, the errors and the surroundings of a run."""
         self.looked = 0
-        self._uncertainty = uncertainty
-        self._encoder_sigma_rad = encoder_sigma_rad
-        self._limits = limits
-        self._motion = motion
+        self._inputs = inputs
+        self._uncertainty = inputs.uncertainty
         self._sensed: tuple[float, Sensed] | None = None
 
     def sense(self, situation: Situation, now_s: float) -> Sensed:
@@ -94,43 +78,22 @@ class PaperLaw:
             displacement_m=displacement_m,
         )
         spheres = moved_and_inflated(situation.pose, np.zeros(3), enlargement_m)
-        table = self.surroundings.see(situation.objects)
-        return TriggerExplained(terms, overlaps_by_object(spheres, table, _classes_of(situation)))
+        table = self._inputs.surroundings.see(situation.objects)
+        return TriggerExplained(terms, overlaps_by_object(spheres, table, everything_but_held(situation)))
 
     def _enlargements(self, situation: Situation) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return D_incr (m,), position covariances (m, 3, 3) and velocities (m, 3) of the spheres."""
         jacobians = situation.pose.sphere_jacobians
-        covariances = position_covariance(jacobians, self._encoder_sigma_rad)
+        covariances = position_covariance(jacobians, self._inputs.encoder_sigma_rad)
         velocities_m_s = jacobians @ situation.joint_velocities_rad_s
         enlargements_m = plain_enlargements_m(self._uncertainty, covariances, velocities_m_s, situation.loop_age_s)
         return enlargements_m, covariances, velocities_m_s
 
     def _look(self, situation: Situation) -> Sensed:
         self.looked += 1
-        pose = situation.pose
         enlargement_m, _, _ = self._enlargements(situation)
-        radii, classes = pose.sphere_radii_m + enlargement_m, _classes_of(situation)
-        spheres = np.concatenate([pose.sphere_centers_m, radii[:, None]], axis=1)
-        overlap_m3 = total_overlap_m3(spheres, self.surroundings.see(situation.objects), classes)
-        stiffness = min(1.0, overlap_m3 / (REFERENCE_SHARE * 4.0 / 3.0 * np.pi * float((radii**3).sum())))
-        able = along_approach(pose, self._limits, self._motion.trigger_speed_m_s)
-        felt = uniform_field(round(STRENGTHS * stiffness), able.full_speed_m_s, able.acceleration_m_s2)
-        velocity_m_s = pose.tool_jacobian[:3] @ situation.joint_velocities_rad_s
-        return Sensed(
-            l2=felt,
-            r2=felt,
-            speed_m_s=float(pose.tool_rotation[:, 2] @ velocity_m_s),
-            tool_speed_m_s=float(np.linalg.norm(velocity_m_s)),
-            horizon_m=FAR_M,
-            enlargement_m=float(enlargement_m.max()),
-            overlap_m3=overlap_m3,
-        )
-
-
-def _classes_of(situation: Situation) -> IntArray:
-    classes = np.array(
-        [SKIPPED if role is Role.IGNORED else OBSTACLE for role in situation.objects.roles], dtype=np.int64
-    )
-    if situation.held is not None:
-        classes[situation.held] = SKIPPED
-    return classes
+        overlap_m3 = self._inputs.overlap_m3(situation, enlargement_m)
+        radii_m = situation.pose.sphere_radii_m + enlargement_m
+        stiffness = min(1.0, overlap_m3 / (REFERENCE_SHARE * 4.0 / 3.0 * np.pi * float((radii_m**3).sum())))
+        figures = {"enlargement_m": float(enlargement_m.max()), "overlap_m3": overlap_m3}
+        return self._inputs.sensed(situation, l2=stiffness, r2=stiffness, **figures)

@@ -24,10 +24,9 @@ from common.arrays import FloatArray
 from common.protocol.around import MOST_JOINTS, Around
 from common.protocol.messages import TriggerField
 from common.touch_speed import touch_speed_m_s
-from robot_side.arm.ability import JointLimits, change_times_s
+from robot_side.arm.ability import change_times_s
 from robot_side.arm.port import GripperPose
-from robot_side.arm.tool_motion import ToolMotionSettings, full_twists
-from robot_side.enlargement.distance import Uncertainty
+from robot_side.arm.tool_motion import full_twists
 from robot_side.field.field import Ahead
 from robot_side.field.object_class import SKIPPED
 from robot_side.field.scratch import Count
@@ -36,12 +35,12 @@ from robot_side.laws.changes import differs, have_moved, is_due, rests
 from robot_side.laws.classes import classes_of
 from robot_side.laws.explanation import explained
 from robot_side.laws.gripper_motion import FingerSpeeds, gripper_motion
+from robot_side.laws.inputs import LawInputs
 from robot_side.laws.law import MOST_M, require_usable
 from robot_side.laws.looking import Looking, Seen
 from robot_side.laws.path import Waypoint
 from robot_side.laws.prospect import Asked, Assumed, horizon_m
 from robot_side.laws.trigger_field import rumble, trigger_field
-from robot_side.surroundings.surroundings import Surroundings
 from robot_side.tick.explained import Trigger, TriggerExplained
 from robot_side.tick.sensed import L2, R2, STICK, Sensed
 from robot_side.tick.situation import Situation
@@ -52,26 +51,15 @@ _AT_REST: Final[FloatArray] = np.empty((0, 3))
 class SweptLaw:
     """The law "swept". It keeps the recent looks along each side."""
 
-    def __init__(
-        self,
-        uncertainty: Uncertainty,
-        encoder_sigma_rad: FloatArray,
-        limits: JointLimits,
-        motion: ToolMotionSettings,
-        surroundings: Surroundings | None = None,
-        *,
-        maps: bool = False,
-    ) -> None:
-        """encoder_sigma_rad (n,): σ_θ of eq. 3. surroundings: owner of the perceived scene; a new one by default.
-
-        maps: whether to look from probes, too, for a map around the gripper.
-        """
-        self.surroundings = surroundings or Surroundings()
+    def __init__(self, inputs: LawInputs, *, maps: bool = False) -> None:
+        """maps: whether to look from probes, too, for a map around the gripper."""
+        self.surroundings = inputs.surroundings
         # A map's message has room for so many joints.
-        probes = ProbeLooks() if maps and len(encoder_sigma_rad) <= MOST_JOINTS else None
-        self.looking = Looking(Ahead(encoder_sigma_rad), probes)
-        self.assumed, self._twists = Assumed(uncertainty, limits, motion), full_twists(motion)
-        self._touch_speed_m_s = touch_speed_m_s(motion.trigger_speed_m_s)
+        probes = ProbeLooks() if maps and len(inputs.encoder_sigma_rad) <= MOST_JOINTS else None
+        self.looking = Looking(Ahead(inputs.encoder_sigma_rad), probes)
+        self.assumed = Assumed(inputs.uncertainty, inputs.limits, inputs.motion)
+        self._twists = full_twists(inputs.motion)
+        self._touch_speed_m_s = touch_speed_m_s(inputs.motion.trigger_speed_m_s)
         self._fingers = FingerSpeeds()
         self._last: Seen | None = None
         """Last tick that looked"""

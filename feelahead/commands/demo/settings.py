@@ -10,7 +10,7 @@ from msgspec import Meta
 from common.command.run_options import RunOptions
 from common.limits import check_limits
 from common.protocol.messages import Compensation
-from robot_side.laws.named import LawName
+from robot_side.laws.named import require_name
 
 
 @dataclass(frozen=True)
@@ -40,9 +40,9 @@ class DemoSettings(RunOptions):
     """Share of approaches in which the warning must come before the contact, between 0 and 1 (eq. 10)."""
     assist: Literal["none", "speed"] = "none"
     """speed: the robot side caps the speed along the triggers, so that the arm stops where full strength begins."""
-    law: LawName = "swept"
+    law: Annotated[str, tyro.conf.arg(metavar="NAME|FILE.py")] = "swept"
     """Law of the stiffness. swept: stiffness along the direction of each trigger, early enough to release the trigger
-    in time. paper: the paper's plain law, for comparison."""
+    in time. paper: the paper's plain law, for comparison. FILE.py: a law of your own (docs/python.md)."""
     compensation: Compensation = "operator"
     """Side that compensates the delay. operator: by the commands still under way. robot: by speed times loop age
     (v t_d, eq. 8)."""
@@ -71,6 +71,7 @@ class DemoSettings(RunOptions):
     def __post_init__(self) -> None:
         super().__post_init__()
         check_limits(self)
+        require_name(self.law)
         if self.tui and self.status != "line":
             raise ValueError(f"--tui and --status {self.status} exclude each other; valid: only one of them")
         if self.scene is not None and self.model is not None:

@@ -8,23 +8,21 @@ from typing import Final
 
 import numpy as np
 
-from common.arrays import FloatArray
 from common.emulation.clauses import LinkModel
 from common.errors import FeelaheadError
 from common.periods import TURN
 from common.protocol.messages import Vector2
-from feelahead.both_sides.loopback import Loopback, LoopbackSettings, robot_parts
-from feelahead.lab.approaches.arming import wait_for_pull
+from feelahead.both_sides.episode import Episode
 from feelahead.lab.approaches.laws import TriedLaw, compensation_of, law_of_robot
 from feelahead.lab.approaches.outcome import SAMPLE_S, End, Outcome, Trace, reversals, stands
 from operator_side.controller.feel import MAX_STRENGTH, ZONE_COUNT, Feel
 from operator_side.controller.state import ControllerState
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
-from operator_side.people.pulling_hands import Pull, PullingHands, constant_force
+from operator_side.people.arming_hands import ArmingHands, constant_force
+from operator_side.people.port import Person
 from operator_side.settings import OperatorSettings
 from robot_side.compiled.warm_up import import_kernels, warm_up
 from robot_side.drivers.mujoco.robot_model import SiteAxis
-from robot_side.drivers.mujoco.scene import load_scene
 from robot_side.drivers.mujoco.true_contact import TrueContact
 from robot_side.settings import Assist, CameraSettings, RobotSettings
 from robot_side.tick.events import Listener
@@ -82,8 +80,8 @@ class Approach:
 class PullRun(Listener):
     """Both sides, their link and a hand that pulls R2; the run can be advanced in steps."""
 
-    def __init__(self, approach: Approach, pull: Pull | None = None) -> None:
-        """Build both sides in the scene. pull: motion of the hand, instead of the constant force."""
+    def __init__(self, approach: Approach, person: Person | None = None) -> None:
+        """Build both sides in the scene. person: who pulls, instead of the constant force."""
         self.approach = approach
         self.onset: ContactOnset | None = None
         """First contact since the pull began; None before it."""
@@ -99,28 +97,15 @@ class PullRun(Listener):
             full_rate=approach.full_rate,
             tick_period=approach.tick_period,
         )
-        scene = load_scene(robot.model, robot.site, robot.roles, site_axis=robot.site_axis)
-        self.truth = TrueContact(scene)
         kind = FullDualSense if approach.law == "full" else SimulatedDualSense
         device = kind(strength_step_n=approach.strongest_n / MAX_STRENGTH)
-        self.hands = PullingHands(
-            device, pull or constant_force(approach.force_n, approach.stick, approach.turn), grip=approach.grip
+        pulls = person or constant_force(approach.force_n, approach.stick, approach.turn)
+        self.hands = ArmingHands(device, pulls, grip=approach.grip)
+        self.episode = Episode(
+            robot=robot, operator=operator, device=device, person=self.hands, listeners=[self], sampled=False
         )
-        self.loopback = Loopback(
-            LoopbackSettings(robot, operator),
-            parts=robot_parts(robot, scene),
-            device=device,
-            person=lambda _: self.hands,
-            listeners=[self],
-        )
-        self._scene = scene
+        self.loopback, self.truth = self.episode.loop, TrueContact(self.episode.scene)
         self._next_s = -math.inf
-
-    @property
-    def tool_position_m(self) -> FloatArray:
-        """Position (3,) of the true tool in the world frame."""
-        position: FloatArray = self._scene.data.site_xpos[self._scene.robot.site].copy()
-        return position
 
     @property
     def disarmed_because(self) -> str | None:
@@ -130,7 +115,7 @@ class PullRun(Listener):
 
     def arm(self) -> float:
         """Run until the pull begins, and return the time of that; FeelaheadError if the robot is not armed in time."""
-        began_s = wait_for_pull(self.loopback, self.hands, self.approach.link)
+        began_s = self.episode.arm().acts_since_s
         if self.truth.touched:
             raise FeelaheadError(
                 f"the gripper touches {', '.join(sorted(self.truth.touched))} before the pull begins; valid: a scene in"
@@ -157,14 +142,14 @@ class PullRun(Listener):
             return
         run, hands = self.loopback, self.hands
         onset = self.truth.update(run.robot.held)
-        if hands.pull_began_s is None:
+        if hands.began_s is None:
             return
         self.onset = onset
         strengths, travel = run.device.strengths[1], run.device.travel[1]
         if now_s >= self._next_s or onset is not None:
             self._next_s = now_s + SAMPLE_S - 1e-9
             speed_m_s, gap_m = self.truth.approach()[1], self.truth.gap_m(run.robot.held)
-            self._rows.append((now_s - hands.pull_began_s, speed_m_s, gap_m, travel, strengths))
+            self._rows.append((now_s - hands.began_s, speed_m_s, gap_m, travel, strengths))
 
 
 def compile_kernels() -> None:

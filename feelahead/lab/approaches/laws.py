@@ -1,16 +1,29 @@
 """Laws that are compared, each a way from the situation to the strengths that the fingers feel."""
 
-from typing import Final, Literal, get_args
+from collections.abc import Sequence
+from typing import Final
 
 from common.protocol.messages import Compensation
-from robot_side.laws.named import LawName
+from robot_side.laws.named import require_name
 
-TriedLaw = Literal["swept", "swept_robot", "paper", "none", "full"]
+TriedLaw = str
+"""Name of a law, one of `LAWS`, of an installed package, or a file"""
+LAWS: Final[tuple[TriedLaw, ...]] = ("swept", "swept_robot", "paper", "none", "full")
 """swept: contact distances along each trigger, rendered over its travel (docs/feel.md); compensation by the operator.
 swept_robot: the same with v t_d by the robot side (--compensation robot). paper: the printed law (§4.2), the total
 overlap over a fixed share of the enlarged gripper. none: no haptics. full: always the strongest effect on both
 triggers."""
-LAWS: Final[tuple[TriedLaw, ...]] = get_args(TriedLaw)
+
+
+def require_tried(laws: Sequence[TriedLaw], flag: str, built_in: Sequence[TriedLaw] = LAWS) -> None:
+    """Raise ValueError, which names `flag`, unless there is a law, each is known and given once."""
+    if not laws or len(set(laws)) < len(laws):
+        raise ValueError(
+            f"--{flag} {' '.join(laws)}: none is given, or one is given twice; valid: one or more of"
+            f" {', '.join(built_in)}, each once"
+        )
+    for law in laws:
+        require_name(law, built_in)
 
 
 def with_compensation(law: TriedLaw, compensation: Compensation) -> TriedLaw:
@@ -33,6 +46,6 @@ def compensation_of(law: TriedLaw) -> Compensation:
     return "robot" if law in ("swept_robot", "paper") else "operator"
 
 
-def law_of_robot(law: TriedLaw) -> LawName:
+def law_of_robot(law: TriedLaw) -> str:
     """Return the law that the robot side's settings must name."""
-    return "paper" if law == "paper" else "swept"
+    return "swept" if law in ("swept_robot", "none", "full") else law

@@ -8,7 +8,7 @@ from typing import Any, Final
 from feelahead.lab.approaches.frozen import scene_names
 from feelahead.lab.approaches.laws import TriedLaw, in_words, with_compensation
 from feelahead.lab.approaches.links import mean_loop_s
-from feelahead.lab.figures import LAW_COLOURS, figure
+from feelahead.lab.figures import colour_of, figure
 from feelahead.lab.table import Row, Table
 
 _LARGEST_MARK, _SMALLER = 10.0, 2.0
@@ -65,7 +65,7 @@ def draw_comparison(table: Table, frozen: str, path: Path) -> None:
                     [median(points[delay]) for delay in sorted(points)],
                     marker=_MARKS[number % len(_MARKS)],
                     markersize=max(_SMALLER, _LARGEST_MARK - _SMALLER * place),
-                    color=LAW_COLOURS[law],
+                    color=colour_of(law, laws),
                     alpha=0.7,
                     label=f"{in_words(law)}, {names[scene]}" if force_n == forces[0] else None,
                 )

@@ -12,7 +12,7 @@ import numpy as np
 from operator_side.controller.feel import SENSED_TRAVEL
 from operator_side.dualsense.simulated.trigger_model import SPRING_PRELOAD_N, SPRING_RISE_N
 from operator_side.hands.travel_calibration import StickRest, TriggerTravel
-from operator_side.people.pulling_hands import FingerInput, Pull
+from operator_side.people.port import FingerInput, Pull
 
 PullKind = Literal["steady", "bell", "on_off", "random", "drift", "yaw", "swerve"]
 PULL_KINDS: Final[tuple[PullKind, ...]] = get_args(PullKind)

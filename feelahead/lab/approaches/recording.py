@@ -13,12 +13,11 @@ import numpy as np
 from common.arrays import FloatArray
 from common.errors import FeelaheadError
 from common.periods import TURN_S
-from feelahead.both_sides.loopback import Loopback, LoopbackSettings, robot_parts
-from feelahead.lab.approaches.arming import wait_for_pull
+from feelahead.both_sides.episode import Episode
+from feelahead.both_sides.loopback import Loopback
 from feelahead.lab.approaches.frozen import SITE, frozen_scene
 from feelahead.lab.approaches.pulls import PullKind, make_pull
-from operator_side.dualsense.simulated.controller import SimulatedDualSense
-from operator_side.people.pulling_hands import PullingHands
+from operator_side.people.port import Pulling
 from operator_side.settings import OperatorSettings
 from robot_side.drivers.mujoco.posed_scene import disable_contacts
 from robot_side.drivers.mujoco.scene import Scene, load_scene
@@ -95,32 +94,32 @@ def record_approach(
     """
     robot = RobotSettings(model=frozen_scene(scene_name), site=SITE, link=link, seed=seed, full_rate=True)
     operator = OperatorSettings(link=link, seed=seed, haptics=False, full_rate=True)
-    scene = load_scene(robot.model, robot.site, robot.roles)
-    disable_contacts(scene)
-    device = SimulatedDualSense()
-    hands = PullingHands(device, make_pull(pull, seed))
-    notes = _Notes(scene)
-    run = Loopback(
-        LoopbackSettings(robot, operator),
-        parts=robot_parts(robot, scene),
-        device=device,
-        person=lambda _: hands,
-        listeners=[notes],
+    notes = _Notes()
+    person = Pulling(make_pull(pull, seed))
+    episode = Episode(
+        robot=robot, operator=operator, world=_without_contacts, person=person, listeners=[notes], sampled=False
     )
-    notes.run = run
-    began_s = wait_for_pull(run, hands, link)
+    run = episode.loop
+    notes.run, notes.scene = run, episode.scene
+    began_s = episode.arm().acts_since_s
     run.run_until(began_s + duration_s)
     if run.robot.session.safety.stops:
         raise FeelaheadError(f"the arm was stopped over --link {link!r}: {run.robot.session.safety.stops[-1][1]}")
     return notes.record(seed, began_s)
 
 
+def _without_contacts(settings: RobotSettings) -> Scene:
+    scene = load_scene(settings.model, settings.site, settings.roles)
+    disable_contacts(scene)
+    return scene
+
+
 class _Notes(Listener):
     """Listener that samples the record's columns after each tick of the robot side."""
 
-    def __init__(self, scene: Scene) -> None:
+    def __init__(self) -> None:
         self.run: Loopback | None = None
-        self._scene = scene
+        self.scene: Scene | None = None
         self._poses: list[dict[str, Any]] = []
         self._ticks: list[dict[str, Any]] = []
         self._commands: list[dict[str, Any]] = []
@@ -128,9 +127,9 @@ class _Notes(Listener):
 
     def on_sent(self, now_s: float) -> None:
         """Sample one tick."""
-        if (run := self.run) is None:
+        if (run := self.run) is None or self.scene is None:
             return
-        data, robot = self._scene.data, self._scene.robot
+        data, robot = self.scene.data, self.scene.robot
         command, seen = run.robot.session.safety.command, run.operator.stiffness
         if command is None:
             self._applied = (math.nan, math.nan)

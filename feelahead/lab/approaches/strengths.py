@@ -20,10 +20,12 @@ from operator_side.hands.travel_calibration import TravelCalibration, TriggerTra
 from robot_side.drivers.mujoco.joint_reference import MotionLimits
 from robot_side.enlargement.distance import Uncertainty
 from robot_side.enlargement.prediction_errors import BUILT_IN, PredictionErrors, load_prediction_errors
+from robot_side.laws.inputs import LawInputs
 from robot_side.laws.law import Law
-from robot_side.laws.paper import PaperLaw
+from robot_side.laws.named import make_law
 from robot_side.laws.swept import SweptLaw
 from robot_side.surroundings.perceived import PerceivedObjects
+from robot_side.surroundings.surroundings import Surroundings
 from robot_side.tick.sensed import Sensed
 from robot_side.tick.situation import Situation
 
@@ -108,10 +110,11 @@ class Judged:
     def _law(self, draw: Draw) -> Law:
         replay = draw.replay
         uncertainty = Uncertainty(self.probability, camera_sd_m=draw.camera_sd_m, prediction=_prediction_errors())
-        arguments = uncertainty, replay.encoder_sigma_rad, MotionLimits().of_joints(replay.joints), replay.motion
-        if law_of_robot(self.law) == "paper":
-            return PaperLaw(*arguments)
-        return SweptLaw(*arguments, maps=self.law == "swept")
+        limits = MotionLimits().of_joints(replay.joints)
+        inputs = LawInputs(uncertainty, replay.encoder_sigma_rad, limits, replay.motion, Surroundings())
+        if self.law == "swept_robot":
+            return SweptLaw(inputs)
+        return make_law(law_of_robot(self.law), inputs)
 
     def _situation(self, draw: Draw, row: int) -> Situation:
         replay, record = draw.replay, draw.replay.record

@@ -4,14 +4,12 @@ from dataclasses import dataclass
 from typing import Final
 
 from common.protocol.messages import Vector2
-from feelahead.both_sides.loopback import Loopback, LoopbackSettings, robot_parts
-from feelahead.lab.approaches.arming import wait_for_pull
+from feelahead.both_sides.episode import GRASPING, Episode
 from feelahead.lab.approaches.frozen import ASIDE, GRIPPED, SITE, frozen_scene
 from operator_side.controller.feel import MAX_STRENGTH
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
-from operator_side.people.pulling_hands import PullingHands, constant_force
+from operator_side.people.arming_hands import ArmingHands, constant_force
 from operator_side.settings import OperatorSettings
-from robot_side.drivers.mujoco.scene import Scene, load_scene
 from robot_side.laws.swept import SweptLaw
 from robot_side.settings import RobotSettings
 from robot_side.tick import events
@@ -44,7 +42,7 @@ class Recorded:
 
     def new_law(self) -> SweptLaw:
         """Return a new law with the settings of the run, as it was at the run's start."""
-        law = robot_parts(self.settings, scene_of(self.name)).law
+        law = Episode(robot=self.settings, sampled=False).parts.law
         if not isinstance(law, SweptLaw):
             raise TypeError(f"law is a {type(law).__name__}; valid: a SweptLaw")
         # Fields along the triggers alone; contact distances from around are not computed.
@@ -73,19 +71,15 @@ def record(name: str, duration_s: float, seed: int = 0, sticks: tuple[Vector2, V
     robot = RobotSettings(model=model, site=None if model is None else SITE, seed=seed, full_rate=True)
     device = SimulatedDualSense(strength_step_n=_STRONGEST_N / MAX_STRENGTH)
     across, turning = ASIDE.get(name, _STRAIGHT) if sticks is None else sticks
-    hands = PullingHands(device, constant_force(FORCE_N, across, turning), grip=name in GRIPPED)
-    run = Loopback(
-        LoopbackSettings(robot, OperatorSettings(seed=seed, full_rate=True)),
-        parts=robot_parts(robot, scene_of(name)),
+    hands = ArmingHands(device, constant_force(FORCE_N, across, turning), grip=name in GRIPPED)
+    episode = Episode(
+        robot=robot,
+        operator=OperatorSettings(seed=seed, full_rate=True),
         device=device,
-        person=None if model is None else lambda _: hands,
+        person=GRASPING if model is None else hands,
         listeners=[noting := _Noting()],
+        sampled=False,
     )
-    from_s = 0.0 if model is None else wait_for_pull(run, hands, "") - _BEFORE_S
-    run.run_until(from_s + duration_s)
+    from_s = 0.0 if model is None else episode.arm().acts_since_s - _BEFORE_S
+    episode.loop.run_until(from_s + duration_s)
     return Recorded(name, tuple(tick for tick in noting.ticks if tick.now_s >= from_s), robot)
-
-
-def scene_of(name: str) -> Scene:
-    """Load the scene of the run called `name`, as it is at the start."""
-    return load_scene(None) if name == DEMO else load_scene(frozen_scene(name), SITE)

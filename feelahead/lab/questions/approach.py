@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
 from statistics import median
-from typing import Annotated, Final, Literal
+from typing import Annotated, Final
 
 import tyro
 from msgspec import Meta
@@ -24,7 +24,14 @@ from common.periods import TURN
 from common.protocol.messages import Compensation, Vector2
 from feelahead.lab.approaches.approach import Approach, compile_kernels, run_approach
 from feelahead.lab.approaches.frozen import AHEAD, ASIDE, GRIPPED, SCENES, SITE, frozen_hash, frozen_scene, scene_names
-from feelahead.lab.approaches.laws import TriedLaw, compensation_of, in_words, with_compensation, without_compensation
+from feelahead.lab.approaches.laws import (
+    TriedLaw,
+    compensation_of,
+    in_words,
+    require_tried,
+    with_compensation,
+    without_compensation,
+)
 from feelahead.lab.approaches.links import require_young_loop
 from feelahead.lab.approaches.outcome import Outcome
 from feelahead.lab.approaches.pictures import draw_comparison, draw_run, law_of_row
@@ -64,9 +71,9 @@ class ApproachSettings(Sweep):
     """Emulated links, in both directions, in netem's syntax: "delay 200ms 10ms distribution normal"."""
     link_model: LinkModel = "datagram"
     """datagram: messages may be lost and reordered. stream: messages stay in order and losses delay them."""
-    law: tuple[Literal["swept", "paper", "none", "full"], ...] = ("swept",)
+    law: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME|FILE.py...")] = ("swept",)
     """Laws to compare. swept: objects ahead along the trigger. paper: the paper's printed law. none: no haptics. full:
-    always the strongest effect."""
+    always the strongest effect. FILE.py: a law of your own (docs/python.md)."""
     compensation: tuple[Compensation, ...] = ("operator",)
     """Side that compensates the delay. operator: by the commands under way. robot: by speed times loop age (v t_d,
     eq. 8), as the law `paper` always does."""
@@ -94,9 +101,10 @@ class ApproachSettings(Sweep):
     def __post_init__(self) -> None:
         super().__post_init__()
         tick_period_s(self.tick_period)
-        for name in ("force", "strongest_effect", "link", "law", "compensation"):
+        for name in ("force", "strongest_effect", "link", "compensation"):
             if not getattr(self, name):
                 raise ValueError(f"--{name.replace('_', '-')}: no value is given; valid: one value or more")
+        require_tried(self.law, "law", ("swept", "paper", "none", "full"))
         for name in ("stick", "turn"):
             if not math.hypot(*getattr(self, name)) <= 1.0 + 1e-9:  # false for NaN, too
                 raise ValueError(

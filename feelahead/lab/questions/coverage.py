@@ -17,9 +17,9 @@ from rich.table import Table as Shown
 from feelahead.lab.approaches.approach import compile_kernels
 from feelahead.lab.approaches.evaluation import LINKS, Placement, Pulls, evaluate
 from feelahead.lab.approaches.frozen import AHEAD, PASSED, frozen_hash
-from feelahead.lab.approaches.laws import LAWS, TriedLaw
+from feelahead.lab.approaches.laws import LAWS, TriedLaw, require_tried
 from feelahead.lab.approaches.pulls import PULL_KINDS, PullKind
-from feelahead.lab.figures import LAW_COLOURS, figure
+from feelahead.lab.figures import colour_of, figure
 from feelahead.lab.sweep import Question, Sweep
 from feelahead.lab.table import Row, Table
 from feelahead.printing.figures import shown
@@ -50,8 +50,9 @@ class CoverageSettings(Sweep):
     --quick: a few cells in three minutes, instead of all in two hours.
     """
 
-    laws: tuple[TriedLaw, ...] = LAWS
-    """Laws to compare."""
+    laws: Annotated[tuple[TriedLaw, ...], tyro.conf.arg(metavar="NAME|FILE.py...")] = LAWS
+    """Laws to compare: swept, swept_robot (the robot side compensates the delay), paper, none, full (always the
+    strongest effect), or files of your own."""
     probabilities: Annotated[tuple[_Probability, ...], tyro.conf.arg(metavar="P...")] = ()
     """Judge only these P, instead of those planned for each cell; each takes n >= 10/(1 - P) draws for each cell."""
     only: Annotated[tuple[str, ...], tyro.conf.arg(metavar="TEXT...")] = ()
@@ -59,11 +60,7 @@ class CoverageSettings(Sweep):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if not self.laws or len(set(self.laws)) < len(self.laws):
-            raise ValueError(
-                f"--laws {' '.join(self.laws)}: none is given, or one is given twice; valid: one or more of"
-                f" {', '.join(LAWS)}, each once"
-            )
+        require_tried(self.laws, "laws")
         if not any(pulls.cells for pulls in self.pulls()):
             raise ValueError(
                 f"--only {' '.join(self.only)}: no cell's name contains it; valid: a part of a cell's name, such as"
@@ -230,15 +227,16 @@ def draw(settings: CoverageSettings, table: Table, path: Path) -> None:
     marks = dict(zip(sorted(set(table.values("probability"))), _MARKS, strict=False))
     with figure(path, figsize=(7.2, 4.6)) as (_, axes):
         for law in settings.laws:
-            axes.plot([], [], color=LAW_COLOURS[law], linewidth=4.0, label=law)
+            colour = colour_of(law, settings.laws)
+            axes.plot([], [], color=colour, linewidth=4.0, label=law)
             points = []
             for probability, mark in marks.items():
                 rows = table.where(law=law, probability=probability)
                 (alarms, _), covered = pooled_alarms(rows), mean(rows, "coverage", ".17g")
                 if alarms and covered:
                     points.append((float(alarms), float(covered)))
-                    axes.plot(*points[-1], mark, color=LAW_COLOURS[law], alpha=0.8)
-            axes.plot([x for x, _ in points], [y for _, y in points], color=LAW_COLOURS[law], linewidth=0.8)
+                    axes.plot(*points[-1], mark, color=colour, alpha=0.8)
+            axes.plot([x for x, _ in points], [y for _, y in points], color=colour, linewidth=0.8)
         for probability, mark in marks.items():
             axes.plot([], [], mark, color="black", label=f"P = {probability:g}")
         axes.set(xlabel="false alarms a minute", ylabel="covered: full strength in time", ylim=(-0.03, 1.03))

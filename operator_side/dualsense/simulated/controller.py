@@ -20,7 +20,7 @@ from operator_side.dualsense.reports.input_report import build_input_report, par
 from operator_side.dualsense.reports.models import Model
 from operator_side.dualsense.reports.output_report import parse_output_report, transport_of_output
 from operator_side.dualsense.reports.transport import Transport
-from operator_side.dualsense.simulated.trigger_model import STRENGTH_STEP_N, SimulatedTrigger
+from operator_side.dualsense.simulated.trigger_model import STRENGTH_STEP_N, SimulatedTrigger, zone_of
 
 INPUT_REPORT_PERIOD_S: Final = 0.004
 """Period of input reports, in seconds: about 250 a second, as on USB (SDL)"""
@@ -122,6 +122,15 @@ class SimulatedDualSense:
     def strengths(self) -> tuple[Strengths, Strengths]:
         """Present strengths of L2's and of R2's zones."""
         return self._l2.strengths, self._r2.strengths
+
+    @property
+    def strength(self) -> tuple[int, int]:
+        """Strengths, 0 to 8, of the zones that L2 and R2 have reached; 0 for a trigger that is not pulled."""
+        l2, r2 = (
+            strengths[zone_of(travel)] if travel > 0.0 else 0
+            for strengths, travel in zip(self.strengths, self.travel, strict=True)
+        )
+        return l2, r2
 
     @property
     def released(self) -> bool:

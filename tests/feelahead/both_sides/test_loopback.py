@@ -11,14 +11,14 @@ import pytest
 from common.periods import TURN_S
 from common.protocol.messages import Compensation
 from common.status.codes import Doing
-from feelahead.both_sides.loopback import Loopback, LoopbackSettings
+from feelahead.both_sides.episode import GRASPING
+from feelahead.both_sides.episode import Episode as Both
+from feelahead.both_sides.loopback import Loopback
 from feelahead.lab.approaches.approach import Approach, PullRun
 from operator_side.controller.feel import USUAL_LIGHT, WARNING_LIGHT
 from operator_side.people.person import SimulatedOperator
-from operator_side.people.pulling_hands import FingerInput
+from operator_side.people.port import FingerInput, Pulling
 from operator_side.people.settings import PersonSettings
-from operator_side.settings import OperatorSettings
-from robot_side.settings import RobotSettings
 from tests.helpers.repository import DATA
 
 pytestmark = pytest.mark.long
@@ -29,8 +29,7 @@ Strengths = tuple[int, ...]
 
 
 def loopback(link: str, *, seed: int = 0, compensation: Compensation = "operator") -> Loopback:
-    operator = OperatorSettings(link=link, seed=seed, compensation=compensation)
-    return Loopback(LoopbackSettings(RobotSettings(link=link, seed=seed), operator))
+    return Both(link=link, seed=seed, compensation=compensation, person=GRASPING, sampled=False).loop
 
 
 episodes = pytest.mark.xdist_group("episodes")
@@ -202,7 +201,7 @@ def test_a_hand_that_pulls_on_through_it_moves_nothing_before_it_has_let_go() ->
     def pull(since_s: float) -> FingerInput:
         return FingerInput(r2_n=0.0 if 1.6 < since_s < 1.8 else 2.0)
 
-    run = PullRun(Approach(DATA / "wall.xml", 0.0, link="to_operator: outage 400ms at 2s"), pull)
+    run = PullRun(Approach(DATA / "wall.xml", 0.0, link="to_operator: outage 400ms at 2s"), Pulling(pull))
     began_s = run.arm()
     assert began_s == pytest.approx(1.23, abs=0.05)
     for _ in run.go_on(began_s + 2.1):
@@ -225,9 +224,8 @@ def test_a_hand_that_pulls_on_through_it_moves_nothing_before_it_has_let_go() ->
 def test_the_summary_tells_how_fast_a_constant_finger_hits_the_wall(
     haptics: bool, slowest_mm_s: float, fastest_mm_s: float
 ) -> None:
-    operator = OperatorSettings(haptics=haptics, person=PersonSettings(pull_n=3.0))
-    run = Loopback(LoopbackSettings(RobotSettings(scene="wall"), operator))
-    run.run_until(4.0)
+    person = PersonSettings(pull_n=3.0)
+    run = Both(scene="wall", haptics=haptics, person=person, sampled=False).step(4.0)
     first = run.summary()["first_contact"]
     assert first["with"] == "wall"
     assert slowest_mm_s < first["speed_mm_s"] < fastest_mm_s

@@ -7,7 +7,8 @@ import pytest
 
 from common.roles import Role
 from common.status.codes import Doing
-from feelahead.both_sides.loopback import Loopback, LoopbackSettings
+from feelahead.both_sides.episode import Episode
+from feelahead.both_sides.loopback import Loopback
 from operator_side.controller.connection import Connection
 from operator_side.controllers import DEVICES, OpeningParts
 from operator_side.settings import OperatorSettings
@@ -26,7 +27,7 @@ def run_of(does: Does, device: Any = "browser", link: str = "", *, robot: RobotS
     operator = OperatorSettings(link=link, device=device)
     pages = DrivingPage(may_drive=device != "hid")
     page = TalkingPage(pages)
-    run = Loopback(LoopbackSettings(robot or RobotSettings(link=link), operator), pages=pages)
+    run = Episode(robot=robot or RobotSettings(link=link), operator=operator, pages=pages, sampled=False).loop
     opening = DEVICES[operator.device](OpeningParts(operator, run.operator, pages))
     assert opening.hands is not None
     run.connection = Connection(opening.search, run.operator)

@@ -25,7 +25,7 @@ from feelahead.lab.approaches.strengths import Draw, Judged
 from feelahead.lab.questions.coverage import QUESTION
 from feelahead.lab.sweep import ask
 from feelahead.lab.table import Row
-from operator_side.people.pulling_hands import FingerInput
+from operator_side.people.port import FingerInput, Pulling
 from robot_side.drivers.mujoco.camera import CameraError
 from robot_side.drivers.mujoco.posed_scene import PosedScene
 from robot_side.drivers.mujoco.scene import load_scene
@@ -141,7 +141,7 @@ def test_strength_without_cause_is_an_alarm_and_only_that() -> None:
 def test_over_a_whole_pull_it_is_what_both_sides_show_live(law: TriedLaw) -> None:
     link = LINKS["200 ms"]
     approach = Approach(frozen_scene("wall"), 0.0, strongest_n=0.0, link=link, law=law, seed=SEED, full_rate=True)
-    run = PullRun(approach, make_pull("steady", SEED))
+    run = PullRun(approach, Pulling(make_pull("steady", SEED)))
     began_s = run.arm()
     for _ in run.go_on(began_s + 2.0):
         pass
@@ -219,7 +219,8 @@ def test_full_physics_does_as_reckoned_around_the_last_moment(link: str, around_
     wall, delays = frozen_scene("wall"), LINKS[link]
     approach = Approach(wall, 0.0, strongest_n=0.0, link=delays, law="none", seed=SEED, full_rate=True)
     began_s, pulls = draw.replay.record.began_s, make_pull("steady", SEED)
-    run = PullRun(approach, lambda since_s: FingerInput() if began_s + since_s >= last_s + around_s else pulls(since_s))
+    pull = Pulling(lambda since_s: FingerInput() if began_s + since_s >= last_s + around_s else pulls(since_s))
+    run = PullRun(approach, pull)
     assert run.arm() == began_s
     for _ in run.go_on(touch_s + 1.0):
         pass

@@ -128,7 +128,7 @@ def test_a_seed_gives_the_same_outcome_whatever_ran_before_and_another_one_anoth
 
 
 def test_a_robot_that_is_not_armed_fails_with_the_link_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("feelahead.lab.approaches.arming.LONGEST_ARMING_S", 3.0)
+    monkeypatch.setattr("feelahead.both_sides.episode.LONGEST_ARMING_S", 3.0)
     for changes, why in (
         ({"link": "loss 100%"}, "not armed within 3 s over --link 'loss 100%'"),
         ({"grip": True}, "grip"),

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from feelahead.lab.approaches.pulls import PULL_KINDS, PullKind, force_for, make_pull
 from operator_side.dualsense.simulated.trigger_model import SimulatedTrigger
 from operator_side.hands.travel_calibration import TriggerTravel
-from operator_side.people.pulling_hands import FingerInput, Pull
+from operator_side.people.port import FingerInput, Pull
 
 STEP_S = 0.001
 SEEDS = range(4)

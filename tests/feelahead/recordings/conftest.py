@@ -13,21 +13,13 @@ from common.protocol.codec import encode
 from common.protocol.messages import Header
 from common.protocol.view_messages import VideoFrame
 from common.recording.content import Content
-from common.recording.entries import pack_block
 from common.recording.mcap_file import RecordingFile
-from common.recording.provenance import provenance
 from common.recording.reading import Recording, open_recording
-from common.recording.wire import BLOCK, FACTS, HEADER, STATUS, VIEW, as_json, stamped
-from common.status.statuses import SideStatus
-from feelahead.both_sides.loopback import VIRTUAL_CLOCK, Loopback, LoopbackSettings
-from operator_side import recorded as operator_recorded
-from operator_side.settings import OperatorSettings
-from robot_side.compiled.warm_up import kernel_digests
-from robot_side.recording import recorder as robot_recorded
-from robot_side.settings import RobotSettings
+from common.recording.wire import FACTS, HEADER, VIEW, as_json, stamped
+from feelahead.both_sides.episode import GRASPING, Episode
+from feelahead.both_sides.episode_recording import BLOCK_S
+from feelahead.both_sides.loopback import Loopback
 
-_BLOCK_S = 0.05
-_FLUSH_BLOCKS = 15
 WALL_OFFSET_S = 1.7e9
 
 
@@ -39,46 +31,13 @@ def record_loopback(
 ) -> None:
     """Record the scripted person's run; `settings` are both sides'. doing: done from that time on, in seconds."""
     left = dict(doing or {})
-    robot, operator = RobotSettings(**settings), OperatorSettings(**settings)
-    notes: dict[str, list[Any]] = {"robot": [], "operator": []}
-    run = Loopback(
-        LoopbackSettings(robot, operator),
-        listeners=[robot_recorded.RobotRecorder(notes["robot"].append)],
-        operator_listeners=[operator_recorded.OperatorRecorder(notes["operator"].append)],
-    )
-    file = RecordingFile(path, WALL_OFFSET_S)
-    content = Content(file)
-    headers = {
-        "robot": provenance(robot, 1, VIRTUAL_CLOCK) | {"kernels": kernel_digests()},
-        "operator": provenance(operator, 2, VIRTUAL_CLOCK),
-    }
-    encoders: dict[str, Any] = {
-        "robot": robot_recorded.RobotEncoder(),
-        "operator": operator_recorded.OperatorEncoder(),
-    }
-    status: dict[str, Callable[[float], SideStatus]] = {"robot": run.robot.status, "operator": run.operator.status}
-    for source, side in enumerate(notes):
-        content.write(source, HEADER + as_json({"side": side, **headers[side]}))
-    for number in range(round(duration_s / _BLOCK_S)):
-        now_s = (number + 1) * _BLOCK_S
-        for due_s in [due_s for due_s in left if due_s < now_s]:
-            left.pop(due_s)(run, now_s - _BLOCK_S)
-        run.run_until(now_s)
-        for source, side in enumerate(notes):
-            views: list[bytes] = []
-            entries = b"".join(
-                encoders[side].encode(noted, lambda when_s, payload, to=views: to.append(stamped(when_s) + payload))[1]
-                for noted in notes[side]
-            )
-            notes[side].clear()
-            content.write(source, BLOCK + pack_block(number, 0, now_s - _BLOCK_S, now_s, entries))
-            for view in views:
-                content.write(source, VIEW + view)
-            content.write(source, STATUS + stamped(now_s) + as_json(status[side](now_s)))
-        if number % _FLUSH_BLOCKS == _FLUSH_BLOCKS - 1:
-            file.flush()
-    file.close()
-    assert file.error is None
+    with Episode(person=GRASPING, sampled=False, **settings) as episode:
+        episode.record(path, wall_clock_s=WALL_OFFSET_S)
+        for number in range(round(duration_s / BLOCK_S)):
+            now_s = (number + 1) * BLOCK_S
+            for due_s in [due_s for due_s in left if due_s < now_s]:
+                left.pop(due_s)(episode.loop, now_s - BLOCK_S)
+            episode.step(now_s - episode.time_s)
 
 
 DURATION_S = 6.0

@@ -11,6 +11,7 @@ from robot_side.arm.port import GripperPose
 from robot_side.arm.tool_motion import ToolMotionSettings
 from robot_side.enlargement.distance import Uncertainty
 from robot_side.enlargement.prediction_errors import PredictionErrors
+from robot_side.laws.inputs import LawInputs
 from robot_side.laws.law import Law
 from robot_side.laws.paper import PaperLaw
 from robot_side.laws.swept import SweptLaw
@@ -36,12 +37,16 @@ def uncertain(**changes: Any) -> Uncertainty:
     return replace(Uncertainty(0.99, camera_sd_m=CAMERA_SD_M, prediction=EXACT), **changes)
 
 
+def inputs(encoder_sigma_rad: float = 0.0, **changes: Any) -> LawInputs:
+    return LawInputs(uncertain(**changes), np.full(6, encoder_sigma_rad), LIMITS, MOTION, Surroundings())
+
+
 def swept(encoder_sigma_rad: float = 0.0, *, maps: bool = False, **changes: Any) -> SweptLaw:
-    return SweptLaw(uncertain(**changes), np.full(6, encoder_sigma_rad), LIMITS, MOTION, Surroundings(), maps=maps)
+    return SweptLaw(inputs(encoder_sigma_rad, **changes), maps=maps)
 
 
 def paper(encoder_sigma_rad: float = 0.0, **changes: Any) -> PaperLaw:
-    return PaperLaw(uncertain(**changes), np.full(6, encoder_sigma_rad), LIMITS, MOTION, Surroundings())
+    return PaperLaw(inputs(encoder_sigma_rad, **changes))
 
 
 def situation(pose: GripperPose, objects: PerceivedObjects | None = None, **changes: Any) -> Situation:

@@ -5,7 +5,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import get_args
 
 import msgspec
 import numpy as np
@@ -17,7 +16,7 @@ from robot_side.compiled.kernel import late_kernels
 from robot_side.compiled.warm_up import warm_up
 from robot_side.drivers.mujoco.scene import load_scene
 from robot_side.drivers.remote.frame_message import SHAPES, SeenObject, perceived
-from robot_side.laws.named import LawName
+from robot_side.laws.named import LAWS
 from robot_side.parts import SceneParts, build_parts
 from robot_side.surroundings.perceived import PerceivedObjects
 from tests.helpers.repository import DATA
@@ -25,7 +24,7 @@ from tests.robot_side.session_bench import QUICK, Bench, Operator
 
 
 @contextmanager
-def prepared(law: LawName, model: Path | None = None, *, any_objects: bool = False) -> Iterator[SceneParts]:
+def prepared(law: str, model: Path | None = None, *, any_objects: bool = False) -> Iterator[SceneParts]:
     """Yield a robot side's parts as a process makes them, with their kernels ready; any other kernel is an error."""
     settings = replace(QUICK, law=law, assist="speed", permit_tuning=True)
     # As the built-in scene: the checks of a person's own model run kernels, too.
@@ -52,7 +51,7 @@ def tell(bench: Bench, operator: Operator, message: Mark | Tune) -> None:
     bench.robot.receive(operator.peer, encode(message), bench.now_s)
 
 
-def set_down(law: LawName) -> None:
+def set_down(law: str) -> None:
     """Grip, lift, lower to the table, let go, go home; then another operator drives, and the scene is put back."""
     with prepared(law, DATA / "place_held.xml") as parts:
         bench = Bench(parts=parts)
@@ -82,7 +81,7 @@ def set_down(law: LawName) -> None:
         bench.robot.summary()
 
 
-def approach_a_mesh(law: LawName) -> None:
+def approach_a_mesh(law: str) -> None:
     with prepared(law, DATA / "mug.xml") as parts:
         bench = Bench(parts=parts)
         bench.cruise(bench.join(2), 0.5)
@@ -113,7 +112,7 @@ class Driver:
         del name, role
 
 
-def meet_all_shapes(law: LawName) -> None:
+def meet_all_shapes(law: str) -> None:
     with prepared(law, any_objects=True) as parts:
         driver = Driver()
         bench = Bench(parts=replace(parts, camera=driver))
@@ -127,6 +126,6 @@ def meet_all_shapes(law: LawName) -> None:
 
 
 if __name__ == "__main__":
-    [name] = [name for name in get_args(LawName) if name in sys.argv]
+    [name] = [name for name in LAWS if name in sys.argv]
     for duty in (set_down, meet_all_shapes, approach_a_mesh):
         duty(name)

@@ -7,7 +7,6 @@ import pytest
 from common.protocol.codec import encode
 from common.protocol.messages import Header, Tune
 from robot_side.enlargement.distance import standard_quantile
-from robot_side.laws.named import LawName
 from robot_side.operators.tuning import Tuning
 from tests.robot_side.session_bench import QUICK, Bench, Operator
 
@@ -34,7 +33,7 @@ def enlargement_mm(bench: Bench) -> float:
 
 
 @pytest.mark.parametrize("law", ["swept", "paper"])
-def test_the_gripper_is_enlarged_by_the_probability_that_was_tuned(law: LawName) -> None:
+def test_the_gripper_is_enlarged_by_the_probability_that_was_tuned(law: str) -> None:
     # Eq. 9-10 at rest: a mean and the quantile's multiple of one deviation, so that three probabilities are on a line.
     bench = Bench(replace(QUICK, permit_tuning=True, law=law))
     owner = bench.join(2)

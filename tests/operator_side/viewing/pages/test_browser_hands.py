@@ -11,7 +11,7 @@ from operator_side.controller.state import Button, ControllerState
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.hands.intent import OperatorIntent, operator_intent
 from operator_side.hands.travel_calibration import StickRest, TravelCalibration, TriggerTravel
-from operator_side.people.pulling_hands import PullingHands, constant_force
+from operator_side.people.arming_hands import ArmingHands, constant_force
 from operator_side.viewing.pages.browser_hands import BrowserHands
 from operator_side.viewing.pages.driving_page import DrivingPage
 from operator_side.viewing.pages.shared_hands import SharedHands
@@ -46,9 +46,9 @@ class Desk:
     def calibrate(self, calibration: TravelCalibration) -> None:
         self.calibration = calibration
 
-    def new_person(self) -> PullingHands:
+    def new_person(self) -> ArmingHands:
         self.people += 1
-        return PullingHands(self.device, constant_force(3.0))
+        return ArmingHands(self.device, constant_force(3.0))
 
     @property
     def now_s(self) -> float:

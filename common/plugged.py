@@ -1,0 +1,135 @@
+"""Parts of others, found by name: built in, installed with an entry point, or in a file of one's own.
+
+A kind is `law`, `controller`, `arm`, `perception`, `person` or `question`. A package registers a part in the entry
+points' group `feelahead.laws` (`feelahead.controllers` and so on). A file defines it under the kind's name.
+"""
+
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib import import_module
+from importlib.metadata import EntryPoint, entry_points
+from pathlib import Path
+from typing import Final
+
+from common.errors import ConfigurationError
+
+PLURALS: Final[Mapping[str, str]] = {
+    "law": "laws",
+    "controller": "controllers",
+    "arm": "arms",
+    "perception": "perceptions",
+    "person": "people",
+    "question": "questions",
+}
+"""Names of the entry points' groups, after `feelahead.`, by kind"""
+_LONGEST_FAULT: Final = 200
+
+
+@dataclass(frozen=True)
+class Installed:
+    """Part that an installed package registers."""
+
+    kind: str
+    name: str
+    package: str
+    fault: str | None
+    """Why it cannot be used, in one line; None if it can"""
+
+
+def find(kind: str, name: str, built_in: Mapping[str, object]) -> object:
+    """Return the part that `name` names; ConfigurationError for one that is unknown or cannot be loaded.
+
+    A name that ends in .py is a file. Built-in names come before those of packages.
+    """
+    if name in built_in:
+        return built_in[name]
+    if name.endswith(".py"):
+        return load_file(kind, Path(name))
+    found = {point.name: point for point in _points(kind)}
+    if name not in found:
+        names = ", ".join([*built_in, *found])
+        raise ConfigurationError(
+            f"{kind} {name!r}: there is no such {kind}; valid: {names}, or a file such as ./mine.py"
+        )
+    try:
+        part: object = found[name].load()
+    except Exception as error:  # a package of somebody else's
+        raise ConfigurationError(f"{kind} {name}, of {_package(found[name])}: {_in_words(error)}") from error
+    return part
+
+
+def known(kind: str) -> list[str]:
+    """Return the names that installed packages register, without loading anything."""
+    return [point.name for point in _points(kind)]
+
+
+def load_file(kind: str, path: Path) -> object:
+    """Return what the Python file defines as `kind`; ConfigurationError if it cannot be loaded or defines none."""
+    valid = f"a Python file that defines {kind}"
+    if not path.is_file():
+        raise ConfigurationError(f"{kind} {path}: there is no such file; valid: {valid}")
+    folder = str(path.absolute().parent)
+    if folder not in sys.path:
+        sys.path.insert(0, folder)  # for files beside it; worker processes get the same path
+    try:
+        module = import_module(path.stem)
+    except Exception as error:  # anybody's code
+        raise ConfigurationError(f"{kind} {path}: {_in_words(error)}") from error
+    if Path(module.__file__ or "").resolve() != path.resolve():
+        raise ConfigurationError(f"{kind} {path}: Python already has a module of this name; valid: another file name")
+    if not hasattr(module, kind):
+        raise ConfigurationError(f"{kind} {path}: the file defines no {kind}; valid: {valid}")
+    part: object = getattr(module, kind)
+    return part
+
+
+def installed() -> list[Installed]:
+    """Return the parts that installed packages register; each is loaded to find its fault."""
+    found = []
+    for kind in PLURALS:
+        for point in _points(kind):
+            fault = None
+            try:
+                point.load()
+            except Exception as error:  # a package of somebody else's
+                fault = _in_words(error)
+            found.append(Installed(kind, point.name, _package(point), fault))
+    return found
+
+
+def require_methods(what: str, part: object, methods: Mapping[str, str]) -> None:
+    """Raise ConfigurationError if `part` lacks one of the methods, which are given with their arguments in words."""
+    lacking = [f"{name}({arguments})" for name, arguments in methods.items() if not callable(getattr(part, name, None))]
+    if lacking:
+        raise ConfigurationError(
+            f"{what}: {type(part).__name__} lacks {', '.join(lacking)}; valid: an object with"
+            f" {', '.join(f'{name}({arguments})' for name, arguments in methods.items())}"
+        )
+
+
+def _points(kind: str) -> list[EntryPoint]:
+    return sorted(entry_points(group=f"feelahead.{PLURALS[kind]}"), key=lambda point: point.name)
+
+
+def _package(point: EntryPoint) -> str:
+    return "a package" if point.dist is None else f"{point.dist.name} {point.dist.version}"
+
+
+def _in_words(error: Exception) -> str:
+    """Return the error in one line, with the line of the file where it arose."""
+    line = next(
+        (f", line {number}" for number in [getattr(error, "lineno", None)] if number is not None),
+        _line_of(error),
+    )
+    said = " ".join(str(error).split()) or "no reason given"
+    return f"{type(error).__name__}{line}: {said}"[:_LONGEST_FAULT]
+
+
+def _line_of(error: Exception) -> str:
+    frame = error.__traceback__
+    while frame is not None and frame.tb_next is not None:
+        frame = frame.tb_next
+    if frame is None or "importlib" in frame.tb_frame.f_code.co_filename:
+        return ""
+    return f", {Path(frame.tb_frame.f_code.co_filename).name} line {frame.tb_lineno}"

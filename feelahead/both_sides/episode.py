@@ -1,0 +1,310 @@
+"""An episode: both sides and their link in this process, in virtual time, built and driven by a few calls."""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final, Self, TypeVar
+
+import numpy as np
+import numpy.typing as npt
+
+from common.arrays import FloatArray
+from common.command.command_line import settings_of
+from common.errors import ConfigurationError, FeelaheadError
+from common.plugged import find, require_methods
+from common.protocol.view_messages import ViewName
+from feelahead.both_sides.history import Contact, History, Sampler
+from feelahead.both_sides.loopback import VIRTUAL_CLOCK, Loopback, Person
+from operator_side import events as operator_events
+from operator_side.assembly import build_operator_side
+from operator_side.controller.state import Button
+from operator_side.dualsense.simulated.controller import SimulatedDualSense
+from operator_side.people.arming_hands import ArmingHands
+from operator_side.people.person import SimulatedOperator
+from operator_side.people.port import FingerInput, Pulling
+from operator_side.people.port import Person as Actor
+from operator_side.people.settings import PersonSettings
+from operator_side.people.simulated_hands import simulated_hands
+from operator_side.settings import OperatorSettings
+from operator_side.viewing.pages.driving_page import DrivingPage
+from robot_side.compiled.warm_up import warm_up
+from robot_side.core.robot_parts import RobotParts
+from robot_side.core.robot_side import RobotSide
+from robot_side.drivers.mujoco.scene import Scene, load_scene
+from robot_side.drivers.mujoco.true_contact import TrueContact
+from robot_side.parts import build_parts
+from robot_side.settings import RobotSettings
+from robot_side.tick import events
+
+if TYPE_CHECKING:
+    from feelahead.both_sides.episode_recording import EpisodeRecording
+
+LONGEST_ARMING_S: Final = 30.0
+_LOOK_S: Final = 0.01
+_DONE_S: Final = 0.05
+_OPERATOR, _ROBOT = OperatorSettings.__dataclass_fields__, RobotSettings.__dataclass_fields__
+_Settings = TypeVar("_Settings", RobotSettings, OperatorSettings)
+GRASPING: Final = "grasping"
+"""Name of the built-in person, who grasps the target, lifts it and sets it down"""
+
+
+class Episode:
+    """Both sides, a simulated arm and controller, and the link between them, in virtual time.
+
+    The same arguments give the same numbers on every machine. `history` has what happened.
+    """
+
+    def __init__(
+        self,
+        *,
+        law: object = None,
+        person: object = None,
+        perception: object = None,
+        arm: object = None,
+        robot: RobotSettings | None = None,
+        operator: OperatorSettings | None = None,
+        device: SimulatedDualSense | None = None,
+        world: Callable[[RobotSettings], Scene] | None = None,
+        pages: DrivingPage | None = None,
+        listeners: Sequence[events.Listener] = (),
+        operator_listeners: Sequence[operator_events.Listener] = (),
+        sampled: bool = True,
+        **settings: Any,
+    ) -> None:
+        """Build both sides. `settings` are the flags of both sides by their names, such as scene, model, site, link,
+        seed, haptics, probability or compensation; those that both have go to both.
+
+        law: a name, a FILE.py, or an object (`robot_side.laws.own.OwnLaw`). person: who acts in `step` and `run`: an
+        object with `act` (`operator_side.people.port.Person`), a FILE.py, `grasping`, PersonSettings, or what makes one
+        from the controller. perception, arm: functions that get the simulated camera, or arm, and return the one to
+        use. robot, operator: all settings of a side. device: the simulated controller. world: loads the scene.
+        sampled: whether there is a `history`.
+        ConfigurationError names a setting that is unknown or out of range, and what is valid.
+        """
+        self._given = {name: value for name, value in settings.items() if value is not None}
+        unknown = [name for name in self._given if name not in _ROBOT and name not in _OPERATOR]
+        if unknown:
+            own = "law, person, perception, arm"
+            valid = ", ".join([own, *sorted(_ROBOT.keys() | _OPERATOR.keys() - {"config", "duration"})])
+            raise ConfigurationError(f"Episode: {', '.join(unknown)}: there is no such setting; valid: {valid}")
+        self.law, self.person, self.perception, self.arm_port = law, person, perception, arm
+        self._device, self._world, self._pages = device, world, pages
+        self._bases = robot, operator
+        self._recording: EpisodeRecording | None = None
+        self._listeners, self._operator_listeners, self._sampled = listeners, operator_listeners, sampled
+        self._build()
+
+    def _build(self) -> None:
+        named = {"law": self.law} if isinstance(self.law, str) else {}
+        self.settings = robot = _settings(RobotSettings, self._bases[0], self._given | named)
+        self.operator_settings = _settings(OperatorSettings, self._bases[1], self._given)
+        load = self._world or _load
+        self.scene = load(robot)
+        parts: RobotParts = build_parts(
+            robot, 1, VIRTUAL_CLOCK, self.scene, law=None if isinstance(self.law, str) else self.law
+        )
+        camera = _replaced("perception", self.perception, parts.camera, {"perceive": "now_s", "set_role": "name, role"})
+        methods = {"command": "joint_velocity_rad_s, valid_until_s", "state": "now_s"}
+        self.parts = replace(parts, camera=camera, arm=_replaced("arm", self.arm_port, parts.arm, methods))
+        self._sampler = None
+        if self._sampled:
+            self._sampler = Sampler(lambda: self.loop, self.scene, TrueContact(self.scene))
+        notes, listeners = self._recording, [*self._listeners]
+        listeners += [] if self._sampler is None else [self._sampler]
+        robot_side = RobotSide(self.parts, listeners if notes is None else [*listeners, notes.robot])
+        warm_up()  # after the scene was loaded, as it decides which kernels are imported
+        hearing = [*self._operator_listeners, *([] if notes is None else [notes.operator])]
+        operator = build_operator_side(self.operator_settings, 2, VIRTUAL_CLOCK, hearing)
+        self.device = self._device or SimulatedDualSense()
+        self._inputs = FingerInput()
+        self._idle = ArmingHands(self.device, Pulling(lambda _: self._inputs))
+        self.hands: Person = self._hands_of(self.person)
+        self.loop = Loopback(robot_side, operator, self.device, self.hands, robot, self.operator_settings, self._pages)
+
+    def _hands_of(self, person: object) -> Person:
+        """Return the hands at the controller for a person in any form; ConfigurationError for something else."""
+        if person is None:
+            return self._idle
+        settings = self.operator_settings
+        if person == GRASPING or isinstance(person, PersonSettings):
+            about = person if isinstance(person, PersonSettings) else settings.person
+            calibration, swap_sides = settings.calibration, settings.swap_sides
+            return simulated_hands(self.device, about, settings.seed, calibration, swap_sides=swap_sides)
+        if isinstance(person, str | Path):
+            person = find("person", str(person), {GRASPING: PersonSettings()})
+        if isinstance(person, type) or (callable(person) and not hasattr(person, "act")):
+            person = person() if isinstance(person, type) else person(self.device)
+        if hasattr(person, "tick"):
+            return person
+        require_methods("person", person, {"act": "seen"})
+        assert isinstance(person, Actor)  # noqa: S101  # it has the method
+        return ArmingHands(self.device, person)
+
+    @property
+    def time_s(self) -> float:
+        """Present virtual time, from the start of both sides."""
+        return self.loop.clock.now()
+
+    @property
+    def armed(self) -> bool:
+        """Whether the arm follows commands."""
+        return self.loop.robot.session.safety.state == "armed"
+
+    @property
+    def history(self) -> History:
+        """What happened so far; ValueError before anything did."""
+        return self._samples.history()
+
+    @property
+    def contacts(self) -> tuple[Contact, ...]:
+        """True contacts of the gripper and what it holds, with their speeds, in order."""
+        return tuple(self._samples.contacts)
+
+    @property
+    def tool_position_m(self) -> FloatArray:
+        """True position (3,) of the tool, in the world frame."""
+        position_m: FloatArray = self.scene.data.site_xpos[self.scene.robot.site].copy()
+        return position_m
+
+    @property
+    def acts_since_s(self) -> float:
+        """Time since when the hands act; FeelaheadError before."""
+        hands = self.loop.person
+        if not isinstance(hands, ArmingHands) or hands.began_s is None:
+            raise FeelaheadError("the hands do not act yet; valid: after arm()")
+        return hands.began_s
+
+    def arm(self) -> Self:
+        """Run until the arm is armed and the hands act; FeelaheadError, with the reason, if that takes over 30 s."""
+        hands = self.loop.person
+        while not self.armed or (isinstance(hands, ArmingHands) and hands.began_s is None):
+            if self.time_s >= LONGEST_ARMING_S:
+                raise FeelaheadError(self._why_not_armed())
+            self._advance(self.time_s + _LOOK_S)
+        return self
+
+    def step(
+        self,
+        seconds: float,
+        *,
+        r2_n: float = 0.0,
+        l2_n: float = 0.0,
+        left_stick: tuple[float, float] = (0.0, 0.0),
+        right_stick: tuple[float, float] = (0.0, 0.0),
+        buttons: Sequence[Button] = (),
+    ) -> Self:
+        """Run for `seconds`, while the person acts; without a person, while the hands do what is given here.
+
+        r2_n, l2_n: forces on the triggers, in newtons. Sticks: right and up positive, -1 to 1 each.
+        """
+        if not (math.isfinite(seconds) and seconds >= 0.0):
+            raise ValueError(f"seconds = {seconds}; valid: a number from 0 on")
+        self._inputs = FingerInput(r2_n, l2_n, left_stick, right_stick, frozenset(buttons))
+        self._advance(self.time_s + seconds)
+        return self
+
+    def run(self, person: object = None, seconds: float = 60.0) -> Self:
+        """Run until the person has finished, at most for `seconds`; person: as for the constructor, else that one."""
+        if person is not None:
+            self.loop.person = self._hands_of(person)
+        end_s = self.time_s + seconds
+        while self.time_s < end_s and not self.done:
+            self._advance(min(self.time_s + _DONE_S, end_s))
+        return self
+
+    @property
+    def done(self) -> bool:
+        """Whether the person has finished."""
+        hands = self.loop.person
+        return isinstance(hands, ArmingHands | SimulatedOperator) and hands.phase == "done"
+
+    def reset(self, seed: int | None = None) -> Self:
+        """Begin anew, with all settings as before but the seed, if one is given."""
+        self.close()
+        self._given |= {} if seed is None else {"seed": seed}
+        self._build()
+        return self
+
+    def summary(self) -> dict[str, Any]:
+        """Return the run's figures, as the demo's `--summary`."""
+        return self.loop.summary()
+
+    def picture(self, view: ViewName = "overview", *, width: int = 640, height: int = 480) -> npt.NDArray[np.uint8]:
+        """Return what the camera sees now, RGB (height, width, 3); FeelaheadError where nothing can be rendered."""
+        from feelahead.both_sides.snapshots import Snapshots  # noqa: PLC0415  # needs Pillow, and a process
+
+        with Snapshots(self.scene, width, height) as snapshots:
+            return snapshots.take(view)
+
+    def record(self, path: str | Path, *, wall_clock_s: float = 0.0) -> Self:
+        """Record into the new file `path`, which `close`, `reset` or the end of a `with` finishes; before the start.
+
+        wall_clock_s: time of day, in seconds since 1970, at the start.
+        """
+        from feelahead.both_sides.episode_recording import EpisodeRecording  # noqa: PLC0415  # needs mcap
+
+        if self.time_s > 0.0:
+            raise ValueError(f"record {path}: the episode is at {self.time_s:.2f} s; valid: before it begins")
+        self.close()
+        self._recording = EpisodeRecording(Path(path), self.settings, self.operator_settings, wall_clock_s)
+        self._build()
+        self._recording.follow(self.loop)
+        return self
+
+    def close(self) -> None:
+        """Finish the recording, if there is one."""
+        recording, self._recording = self._recording, None
+        if recording is not None:
+            recording.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def _advance(self, end_s: float) -> None:
+        if self._recording is not None:
+            while (block_s := self._recording.next_s) <= end_s:
+                self.loop.run_until(block_s)
+                self._recording.write(block_s)
+        self.loop.run_until(end_s)
+
+    @property
+    def _samples(self) -> Sampler:
+        if self._sampler is None:
+            raise ValueError("the episode is not sampled; valid: Episode(sampled=True)")
+        return self._sampler
+
+    def _why_not_armed(self) -> str:
+        robot, hands = self.loop.robot, self.loop.person
+        stops = robot.session.safety.stops
+        why = f"{stops[-1][1]}; " if stops else ""
+        grip = " and did not grip" if isinstance(hands, ArmingHands) and hands.phase == "grip" else ""
+        return (
+            f"the robot was not armed{grip} within {LONGEST_ARMING_S:g} s over --link {self.settings.link!r}: {why}"
+            f"loop age {robot.loop_age_s(self.time_s):.2f} s, {robot.session.motion_received} commands arrived"
+        )
+
+
+def _settings(kind: type[_Settings], base: _Settings | None, given: Mapping[str, Any]) -> _Settings:
+    mine = {name: value for name, value in given.items() if name in kind.__dataclass_fields__}
+    return settings_of(mine, kind, "Episode") if base is None else replace(base, **mine)
+
+
+def _load(settings: RobotSettings) -> Scene:
+    name = settings.scene or "table"
+    return load_scene(settings.model, settings.site, settings.roles, name, settings.seed, settings.site_axis)
+
+
+def _replaced(kind: str, given: object, simulated: Any, methods: dict[str, str]) -> Any:
+    """Return the part that `given`, a function or FILE.py, makes of the simulated one; that one if None."""
+    if given is None:
+        return simulated
+    made = find(kind, str(given), {}) if isinstance(given, str | Path) else given
+    if not callable(made):
+        raise ConfigurationError(f"{kind}: is a {type(made).__name__}; valid: a function that takes the simulated one")
+    part = made(simulated)
+    require_methods(kind, part, methods)
+    return part
