@@ -43,7 +43,13 @@ if TYPE_CHECKING:
 LONGEST_ARMING_S: Final = 30.0
 _LOOK_S: Final = 0.01
 _DONE_S: Final = 0.05
-_OPERATOR, _ROBOT = OperatorSettings.__dataclass_fields__, RobotSettings.__dataclass_fields__
+_OF_PROCESSES: Final = frozenset(
+    "arm asymmetry audit bind cameras config connect connections console console_port console_token controller device"
+    " duration insecure keys law objects person person_waits realtime record robot_key status summary tui view_bind"
+    " view_connect".split()
+)
+"""Settings of processes, sockets and terminals, and those that are arguments of their own"""
+_SETTINGS: Final = (RobotSettings.__dataclass_fields__ | OperatorSettings.__dataclass_fields__).keys() - _OF_PROCESSES
 _Settings = TypeVar("_Settings", RobotSettings, OperatorSettings)
 GRASPING: Final = "grasping"
 """Name of the built-in person, who grasps the target, lifts it and sets it down"""
@@ -83,11 +89,9 @@ class Episode:
         ConfigurationError names a setting that is unknown or out of range, and what is valid.
         """
         self._given = {name: value for name, value in settings.items() if value is not None}
-        unknown = [name for name in self._given if name not in _ROBOT and name not in _OPERATOR]
-        if unknown:
-            own = "law, person, perception, arm"
-            valid = ", ".join([own, *sorted(_ROBOT.keys() | _OPERATOR.keys() - {"config", "duration"})])
-            raise ConfigurationError(f"Episode: {', '.join(unknown)}: there is no such setting; valid: {valid}")
+        if unknown := self._given.keys() - _SETTINGS:
+            valid = ", ".join(sorted(_SETTINGS | {"law", "person", "perception", "arm"}))
+            raise ConfigurationError(f"Episode: {', '.join(sorted(unknown))}: no such setting; valid: {valid}")
         self.law, self.person, self.perception, self.arm_port = law, person, perception, arm
         self._device, self._world, self._pages = device, world, pages
         self._bases = robot, operator
