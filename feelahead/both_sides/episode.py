@@ -46,7 +46,7 @@ _DONE_S: Final = 0.05
 _OF_PROCESSES: Final = frozenset(
     "arm asymmetry audit bind cameras config connect connections console console_port console_token controller device"
     " duration insecure keys law objects person person_waits realtime record robot_key status summary tui view_bind"
-    " view_connect".split()
+    " view_connect".split()  # noqa: SIM905
 )
 """Settings of processes, sockets and terminals, and those that are arguments of their own"""
 _SETTINGS: Final = (RobotSettings.__dataclass_fields__ | OperatorSettings.__dataclass_fields__).keys() - _OF_PROCESSES
