@@ -43,11 +43,11 @@ if TYPE_CHECKING:
 LONGEST_ARMING_S: Final = 30.0
 _LOOK_S: Final = 0.01
 _DONE_S: Final = 0.05
-_OF_PROCESSES: Final = frozenset(
-    "arm asymmetry audit bind cameras config connect connections console console_port console_token controller device"
-    " duration insecure keys law objects person person_waits realtime record robot_key status summary tui view_bind"
-    " view_connect".split()  # noqa: SIM905
-)
+_OF_PROCESSES: Final = {
+    *("arm", "asymmetry", "audit", "bind", "cameras", "config", "connect", "connections", "console", "console_port"),
+    *("console_token", "controller", "device", "duration", "insecure", "keys", "law", "objects", "person"),
+    *("person_waits", "realtime", "record", "robot_key", "status", "summary", "tui", "view_bind", "view_connect"),
+}
 """Settings of processes, sockets and terminals, and those that are arguments of their own"""
 _SETTINGS: Final = (RobotSettings.__dataclass_fields__ | OperatorSettings.__dataclass_fields__).keys() - _OF_PROCESSES
 _Settings = TypeVar("_Settings", RobotSettings, OperatorSettings)

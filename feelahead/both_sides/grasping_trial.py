@@ -61,6 +61,8 @@ class Trial:
     """MJCF file of an arm instead of the built-in one; `site` and `site_axis` belong to it"""
     site: str | None = None
     site_axis: SiteAxis = "z"
+    law: str = "swept"
+    """Law of the stiffness, by its name or file; empty: the default"""
 
 
 class _Silent:
@@ -99,6 +101,7 @@ class Watch(Listener):
             site_axis=trial.site_axis,
             camera=CameraSettings(sd_m=trial.camera_sd_m),
             probability=trial.probability,
+            law=trial.law or "swept",
         )
         operator = OperatorSettings(
             link=trial.link,

@@ -21,7 +21,7 @@ from feelahead.printing.figures import shown
 from feelahead.printing.progress import progress
 
 _TAKEN: Final = {
-    *("compare", "config", "console", "console_port", "duration", "link", "link_model"),
+    *("compare", "config", "console", "console_port", "duration", "law", "link", "link_model"),
     *("probability", "scene", "seed", "summary", "tick_period"),
 }
 """Settings that a comparison takes"""
@@ -87,6 +87,7 @@ def compute(settings: DemoSettings, *, pictures: bool | None = None) -> list[dic
                 settings.link_model,
                 tick_period=settings.tick_period,
                 probability=settings.probability,
+                law=settings.law,
             )
             runs.append({"name": name, **compared_run(trial, settings.seed, shown.advance, pictures=drawn)})
             shown.advance(limit_s - runs[-1]["took_s"])

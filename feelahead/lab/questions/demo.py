@@ -29,6 +29,7 @@ from robot_side.drivers.mujoco.checks.start_collision import start_collision
 from robot_side.drivers.mujoco.gripper_measurement import measure_gripper
 from robot_side.drivers.mujoco.robot_model import SiteAxis
 from robot_side.drivers.mujoco.scene import load_scene
+from robot_side.laws.named import require_name
 
 COLUMNS: Final = {
     "seed": ("seed", 0),
@@ -59,6 +60,8 @@ class DemoSettings(Sweep):
     """Site of the model between the fingertips, with the z axis along the approach."""
     site_axis: SiteAxis = "z"
     """Axis of the site along which R2 advances."""
+    law: Annotated[str, tyro.conf.arg(metavar="NAME|FILE.py")] = "swept"
+    """Law of the stiffness: swept, paper, or a file of your own (docs/python.md)."""
     link: Annotated[tuple[str, ...], tyro.conf.arg(metavar="SPEC...")] = ("", "delay 200ms 10ms distribution normal")
     """Emulated links, in both directions, in netem's syntax."""
     link_model: LinkModel = "datagram"
@@ -71,6 +74,7 @@ class DemoSettings(Sweep):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        require_name(self.law)
         tick_period_s(self.tick_period)
         if self.person.pull_n is not None:
             raise ValueError(
@@ -87,7 +91,7 @@ def cells(settings: DemoSettings) -> Iterator[Trial]:
     for link in settings.link[: 1 if settings.quick else None]:
         one = Trial(settings.scene, link, "reacting", settings.person, settings.duration, settings.link_model)
         own = replace(one, model=settings.model, site=settings.site, site_axis=settings.site_axis)
-        yield replace(own, tick_period=settings.tick_period)
+        yield replace(own, tick_period=settings.tick_period, law=settings.law)
 
 
 def run(cell: Trial, seed: int) -> Iterator[Row]:

@@ -18,14 +18,18 @@ from rich.table import Table as Shown
 
 from common.emulation.clauses import LinkModel
 from feelahead.both_sides.grasping_trial import MISJUDGES_DEPTH, Arm, Trial, run_trial
+from feelahead.lab.approaches.laws import require_tried
 from feelahead.lab.intervals import mcnemar_p, mean_interval, share_interval
 from feelahead.lab.sweep import Question, Sweep
 from feelahead.lab.table import Row, Table
 from feelahead.printing.figures import shown
 from operator_side.people.settings import PersonSettings
 from robot_side.drivers.mujoco.built_in_scenes import SceneName
+from robot_side.laws.named import LAWS
 
 _ARMS: dict[Arm, str] = {"off": "off", "mechanical": "on, no notice taken", "reacting": "on, reacts"}
+_NO_LAW = ""
+"""Law of the trials without haptics"""
 
 _JITTER_MS = 10.0
 """Standard deviation of all delays but 0"""
@@ -44,6 +48,8 @@ class HapticsSettings(Sweep):
 
     seeds: Annotated[int, Meta(ge=1), tyro.conf.arg(metavar="N")] = 30
     """Number of seeds; each gives one trial for each condition."""
+    law: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME|FILE.py...")] = ("swept",)
+    """Laws to compare: swept, paper, or files of your own (docs/python.md)."""
     scenes: tuple[SceneName, ...] = ("wall", "slot", "shelf")
     """Scenes. wall: a wall behind the target. slot: two posts on the way. shelf: a raised edge on the way. table:
     clutter beside the way."""
@@ -61,6 +67,7 @@ class HapticsSettings(Sweep):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        require_tried(self.law, "law", tuple(LAWS))
         if self.person.pull_n is not None:
             raise ValueError(
                 f"--person.pull-n {self.person.pull_n}: a finger that only pulls cannot do the task; valid: without it"
@@ -81,17 +88,20 @@ class Cell:
     scene: SceneName
     delay_ms: float
     arm: Arm
+    law: str
+    """Law of a trial with haptics; empty without"""
     trial: Trial
 
 
 def cells(settings: HapticsSettings) -> Iterator[Cell]:
-    """Yield each combination of scene, delay and condition."""
+    """Yield each combination of scene, delay, condition and, with haptics, law."""
     few = 1 if settings.quick else None
-    for scene, delay_ms, arm in product(settings.scenes[:few], settings.delays[:few], _ARMS):
+    for scene, delay_ms, (arm, law) in product(settings.scenes[:few], settings.delays[:few], _conditions(settings)):
         yield Cell(
             scene,
             delay_ms,
             arm,
+            law,
             Trial(
                 scene,
                 f"delay {delay_ms:g}ms {_JITTER_MS:g}ms distribution normal" if delay_ms else "",
@@ -101,8 +111,13 @@ def cells(settings: HapticsSettings) -> Iterator[Cell]:
                 settings.link_model,
                 camera_sd_m=1e-3 * settings.camera_mm,
                 probability=settings.probability,
+                law=law,
             ),
         )
+
+
+def _conditions(settings: HapticsSettings) -> list[tuple[Arm, str]]:
+    return [("off", _NO_LAW), *((arm, law) for law in settings.law for arm in _ARMS if arm != "off")]
 
 
 def run(cell: Cell, seed: int) -> Iterator[Row]:
@@ -116,15 +131,17 @@ def show(settings: HapticsSettings, table: Table) -> Iterator[Shown]:
         title = f"{scene}, {delay_ms:g} ms each way, {settings.seeds} pairs"
         hits = "trials with a hit [95 %]", "p", "hits", "mm/s, median (most)", "grasped", "placed"
         headings = ("haptics", *hits, "felt first", "R2 full", "finished, s", "longer by [95 %]")
-        yield shown(
-            title, headings, ((words, *_figures(pairs, arm, settings.duration)) for arm, words in _ARMS.items())
-        )
+        entries = []
+        for arm, law in _conditions(settings):
+            words = _ARMS[arm] if len(settings.law) == 1 or not law else f"{law}: {_ARMS[arm]}"
+            entries.append((words, *_figures(pairs, arm, law, settings.duration)))
+        yield shown(title, headings, entries)
 
 
-def _figures(pairs: Table, arm: Arm, limit_s: float) -> list[str]:
+def _figures(pairs: Table, arm: Arm, law: str, limit_s: float) -> list[str]:
     """Return the entries of one condition's row, compared with the trials of the same seeds without haptics."""
     off = {row["seed"]: row for row in pairs.where(arm="off")}
-    those = [row for row in pairs.where(arm=arm) if row["seed"] in off]
+    those = [row for row in pairs.where(arm=arm, law=law) if row["seed"] in off]
     if not those:
         return []
     hit = [row["hits"] > 0 for row in those]
