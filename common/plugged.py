@@ -5,12 +5,12 @@ points' group `feelahead.laws` (`feelahead.controllers` and so on). A file defin
 """
 
 import sys
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from common.errors import ConfigurationError
 
@@ -48,10 +48,7 @@ def find(kind: str, name: str, built_in: Mapping[str, object]) -> object:
         return load_file(kind, Path(name))
     found = {point.name: point for point in _points(kind)}
     if name not in found:
-        names = ", ".join([*built_in, *found])
-        raise ConfigurationError(
-            f"{kind} {name!r}: there is no such {kind}; valid: {names}, or a file such as ./mine.py"
-        )
+        raise _unknown(kind, name, [*built_in, *found])
     try:
         part: object = found[name].load()
     except Exception as error:  # a package of somebody else's
@@ -62,6 +59,12 @@ def find(kind: str, name: str, built_in: Mapping[str, object]) -> object:
 def known(kind: str) -> list[str]:
     """Return the names that installed packages register, without loading anything."""
     return [point.name for point in _points(kind)]
+
+
+def require_name(kind: str, name: str, built_in: Collection[str]) -> None:
+    """Raise ConfigurationError unless `name` is known, or a file; no file is read, and nobody's code is run."""
+    if name not in built_in and not name.endswith(".py") and name not in (others := known(kind)):
+        raise _unknown(kind, name, [*built_in, *others])
 
 
 def load_file(kind: str, path: Path) -> object:
@@ -81,6 +84,24 @@ def load_file(kind: str, path: Path) -> object:
     if not hasattr(module, kind):
         raise ConfigurationError(f"{kind} {path}: the file defines no {kind}; valid: {valid}")
     part: object = getattr(module, kind)
+    return part
+
+
+def made_of(kind: str, given: object, simulated: Any, methods: Mapping[str, str]) -> Any:
+    """Return the part that `given`, a function, a name or a file, makes of the simulated one; that one if None.
+
+    ConfigurationError if it makes none, or one that lacks a method.
+    """
+    if given is None:
+        return simulated
+    makes = find(kind, str(given), {}) if isinstance(given, str | Path) else given
+    if not callable(makes):
+        raise ConfigurationError(f"{kind}: is a {type(makes).__name__}; valid: a function that takes the simulated one")
+    try:
+        part = makes(simulated)
+    except Exception as error:  # anybody's code
+        raise ConfigurationError(f"{kind}: {_in_words(error)}") from error
+    require_methods(kind, part, methods)
     return part
 
 
@@ -110,6 +131,11 @@ def require_methods(what: str, part: object, methods: Mapping[str, str]) -> None
 
 def _points(kind: str) -> list[EntryPoint]:
     return sorted(entry_points(group=f"feelahead.{PLURALS[kind]}"), key=lambda point: point.name)
+
+
+def _unknown(kind: str, name: str, names: list[str]) -> ConfigurationError:
+    valid = ", ".join([*names, "a file such as ./mine.py"])
+    return ConfigurationError(f"{kind} {name!r}: there is no such {kind}; valid: {valid}")
 
 
 def _package(point: EntryPoint) -> str:

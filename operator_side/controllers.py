@@ -1,12 +1,18 @@
-"""Table of the controllers that --device selects, and how each is opened. A new controller needs a line here."""
+"""Table of the controllers that --device selects, and how each is opened. A new controller needs a line here.
+
+Others come from packages and files (`common.plugged`): a function without arguments that opens one, or raises
+DeviceError, whose text says what to do; it is called again until it succeeds.
+"""
 
 import dataclasses
 import functools
 from collections.abc import Callable, Mapping
 from typing import Final, NamedTuple
 
+from common.errors import ConfigurationError, DeviceError
+from common.plugged import find, require_methods
 from operator_side.controller.background_writes import BackgroundWrites
-from operator_side.controller.port import OpenController
+from operator_side.controller.port import Controller, OpenController
 from operator_side.controller.search import BackgroundSearch, Ready
 from operator_side.core import OperatorSide
 from operator_side.dualsense.hid.device import HidBackend, load_backend
@@ -15,7 +21,7 @@ from operator_side.dualsense.hid.release_guard import ReleaseGuard
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.evdev.pad import find_pad
 from operator_side.people.simulated_hands import simulated_hands
-from operator_side.settings import DeviceName, OperatorSettings
+from operator_side.settings import OperatorSettings
 from operator_side.viewing.pages.browser_hands import BrowserHands
 from operator_side.viewing.pages.driving_page import DrivingPage
 from operator_side.viewing.pages.shared_hands import SharedHands
@@ -69,7 +75,10 @@ def _simulated(given: OpeningParts) -> Opening:
     settings, device, core = given.settings, SimulatedDualSense(), given.core
     calibration, swap_sides = settings.calibration, settings.swap_sides
     person = functools.partial(
-        simulated_hands, device, settings.person, settings.seed, calibration, swap_sides=swap_sides
+        simulated_hands,
+        *(device, settings.person, settings.seed, calibration),
+        swap_sides=swap_sides,
+        own=settings.person_file,
     )
     shared = SharedHands(given.pages, core.calibrate, device, calibration, person, swap_sides=swap_sides)
     return Opening(Ready(OpenController(shared, "simulated DualSense")), hands=shared)
@@ -80,9 +89,34 @@ def _browser(given: OpeningParts) -> Opening:
     return Opening(Ready(OpenController(page, "a page of the console")), hands=page)
 
 
-DEVICES: Final[Mapping[DeviceName, Callable[[OpeningParts], Opening]]] = {
+DEVICES: Final[Mapping[str, Callable[[OpeningParts], Opening]]] = {
     "hid": _hid,
     "evdev": _evdev,
     "simulated": _simulated,
     "browser": _browser,
 }
+_METHODS: Final = {"read": "now_s", "write": "feel, now_s", "close": ""}
+
+
+def opening_of(name: str, given: OpeningParts) -> Opening:
+    """Return the opening of the controller `name`; ConfigurationError for one that is unknown or cannot be loaded."""
+    if name in DEVICES:
+        return DEVICES[name](given)
+    opens = find("controller", name, DEVICES)
+    if not callable(opens):
+        raise ConfigurationError(
+            f"controller {name}: is a {type(opens).__name__}; valid: a function or class that opens one"
+        )
+    return Opening(BackgroundSearch(functools.partial(_open, name, opens)))
+
+
+def _open(name: str, opens: Callable[[], Controller], preferred: str | None) -> OpenController:
+    del preferred
+    try:
+        device = opens()
+    except DeviceError:
+        raise
+    except Exception as error:  # anybody's code
+        raise DeviceError(f"controller {name}: {type(error).__name__}: {error}") from error
+    require_methods(f"controller {name}", device, _METHODS)
+    return OpenController(device, name)

@@ -11,7 +11,7 @@ from common.loop.process import Process
 from common.sockets.authentication import OperatorKeys
 from common.sockets.operator import OperatorSockets
 from operator_side.controller.connection import Connection
-from operator_side.controllers import DEVICES, OpeningParts
+from operator_side.controllers import OpeningParts, opening_of
 from operator_side.core import OperatorSide
 from operator_side.dualsense.hid.device import HidBackend
 from operator_side.recorded import OperatorEncoder, build_recorded
@@ -63,7 +63,7 @@ def _desk(
 ) -> Devices:
     """Open the controller, and return it with the page and the console."""
     pages, stack = DrivingPage(), process.stack
-    search, guard, person = DEVICES[settings.device](OpeningParts(settings, core, pages, backend))
+    search, guard, person = opening_of(settings.device, OpeningParts(settings, core, pages, backend))
     pages.may_drive = person is not None
     if guard is not None:
         stack.enter_context(guard)

@@ -3,13 +3,14 @@
 import re
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Final
 
 import tyro
 from msgspec import Meta
 
 from common.command.run_options import SideOptions
 from common.limits import check_limits
+from common.plugged import require_name
 from common.protocol.messages import Compensation
 from common.sockets.round_robin import CONNECTIONS, MOST_CONNECTIONS_EACH
 from operator_side.controller.port import check_choice
@@ -18,7 +19,7 @@ from operator_side.hands.choices import SpeedScale, StickFrame
 from operator_side.hands.travel_calibration import TravelCalibration
 from operator_side.people.settings import PersonSettings
 
-DeviceName = Literal["hid", "evdev", "simulated", "browser"]
+DEVICE_NAMES: Final = ("hid", "evdev", "simulated", "browser")
 """Keys of the table DEVICES in operator_side/controllers.py"""
 
 
@@ -47,10 +48,10 @@ class OperatorSettings(SideOptions):
     connections: Annotated[int, Meta(ge=1, le=MOST_CONNECTIONS_EACH)] = CONNECTIONS
     """Number of connections to the robot side, used in turn, so that a lost packet delays only the messages on its own
     connection. 8 help where packets are lost in bursts."""
-    device: DeviceName = "hid"
+    device: Annotated[str, tyro.conf.arg(metavar="NAME|FILE.py")] = "hid"
     """Controller. hid: a DualSense; if absent, it is waited for. evdev (Linux): any gamepad that rumbles. simulated: a
     simulated DualSense with a scripted person, which a page of the console may take over. browser: only a page of the
-    console."""
+    console. FILE.py: a controller of your own (docs/controllers.md)."""
     controller: Annotated[str | None, tyro.conf.arg(metavar="ADDRESS")] = None
     """Take only the DualSense with this address, as `feelahead doctor` prints it."""
     haptics: bool = True
@@ -81,6 +82,8 @@ class OperatorSettings(SideOptions):
     """Show the console's facts on the whole terminal instead of one line, for machines without a browser."""
     person: PersonSettings = field(default_factory=PersonSettings)
     """Abilities and errors of the scripted person (only with --device simulated)."""
+    person_file: Annotated[Path | None, tyro.conf.arg(metavar="FILE.py")] = None
+    """A person of your own instead of the scripted one (only with --device simulated; docs/python.md)."""
     person_waits: Annotated[float, Meta(ge=0.0, le=3600.0), tyro.conf.arg(metavar="SECONDS")] = 0.0
     """Longest time, in seconds, that the scripted person waits for the first picture on a page of the console, counted
     from the robot side's first telemetry."""
@@ -90,6 +93,7 @@ class OperatorSettings(SideOptions):
         check_limits(self)
         if self.tui and self.status != "line":
             raise ValueError(f"--tui and --status {self.status} exclude each other; valid: only one of them")
+        require_name("controller", self.device, DEVICE_NAMES)
         check_choice(self.device, self.controller)
         if self.console_token is not None:
             _check_token(self.console_token)

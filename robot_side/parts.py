@@ -3,12 +3,13 @@
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from common.arrays import BoolArray, FloatArray
 from common.errors import ConfigurationError
+from common.plugged import made_of
 from common.protocol.link_end import LinkEnd
 from common.roles import Role
 from common.timing.ages import LoopAge
@@ -52,6 +53,8 @@ from robot_side.surroundings.surroundings import Surroundings
 if TYPE_CHECKING:
     from robot_side.laws.named import NamedLaw
 
+PERCEIVES: Final = {"perceive": "now_s", "set_role": "name, role"}
+"""Methods of an ObjectSource"""
 _NAMED_OBJECTS = 8
 """Maximum number of objects that a note names"""
 
@@ -132,7 +135,7 @@ def build_parts(
     return SceneParts(
         arm=arm,
         kinematics=kinematics,
-        camera=seen_elsewhere or camera,
+        camera=seen_elsewhere or made_of("perception", settings.perception, camera, PERCEIVES),
         law=law,
         explains=law,
         surroundings=surroundings,

@@ -10,13 +10,14 @@ from msgspec import Meta
 
 from common.command.run_options import SideOptions
 from common.limits import check_limits, check_value
+from common.plugged import require_name
 from common.roles import Role
 from robot_side.arm.tool_motion import ToolMotionSettings
 from robot_side.drivers.mujoco.built_in_scenes import SceneName
 from robot_side.drivers.mujoco.robot_model import SiteAxis
 from robot_side.enlargement.distance import Uncertainty, Vector3
 from robot_side.enlargement.prediction_errors import BUILT_IN, PredictionErrors, load_prediction_errors
-from robot_side.laws.named import require_name
+from robot_side.laws.named import require_law
 from robot_side.operators.safety import SafetySettings
 from robot_side.viewing.settings import CamerasSettings
 
@@ -95,6 +96,9 @@ class RobotSettings(SideOptions):
     --model describes the arm. With --keys the driver needs an allowed key, as an operator does."""
     objects: Annotated[str | None, tyro.conf.arg(metavar="tcp://HOST:PORT")] = None
     """Address at which your perception process connects, instead of a simulated camera (docs/drivers.md)."""
+    perception: Annotated[str | None, tyro.conf.arg(metavar="NAME|FILE.py")] = None
+    """Perception of your own in this process: a function that gets the simulated camera and returns the one to use
+    (docs/python.md)."""
     scene: Annotated[SceneName | None, tyro.conf.arg(metavar="{table,wall,slot,shelf}")] = None
     """Scene of the built-in arm. table (the default): a cluttered table. wall: a wall 10 to 60 mm behind the target.
     slot: two posts on the way, with 15 to 40 mm of clearance on each side. shelf: a shelf with a raised front edge to
@@ -140,7 +144,11 @@ class RobotSettings(SideOptions):
             raise ValueError(
                 "--insecure and --keys exclude each other, as keys decide who may connect; valid: only one of them"
             )
-        require_name(self.law)
+        require_law(self.law)
+        if self.perception is not None:
+            require_name("perception", self.perception, ())
+            if self.objects is not None:
+                raise ValueError("--perception and --objects exclude each other; valid: one of them")
         self.uncertainty(PredictionErrors())
 
     def uncertainty(self, prediction: PredictionErrors) -> Uncertainty:

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from common.arrays import FloatArray
 from common.command.command_line import settings_of
 from common.errors import ConfigurationError, FeelaheadError
-from common.plugged import find, require_methods
+from common.plugged import made_of
 from common.protocol.view_messages import ViewName
 from feelahead.both_sides.history import Contact, History, Sampler
 from feelahead.both_sides.loopback import VIRTUAL_CLOCK, Loopback, Person
@@ -23,9 +23,8 @@ from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.people.arming_hands import ArmingHands
 from operator_side.people.person import SimulatedOperator
 from operator_side.people.port import FingerInput, Pulling
-from operator_side.people.port import Person as Actor
 from operator_side.people.settings import PersonSettings
-from operator_side.people.simulated_hands import simulated_hands
+from operator_side.people.simulated_hands import own_person, simulated_hands
 from operator_side.settings import OperatorSettings
 from operator_side.viewing.pages.driving_page import DrivingPage
 from robot_side.compiled.warm_up import warm_up
@@ -33,7 +32,7 @@ from robot_side.core.robot_parts import RobotParts
 from robot_side.core.robot_side import RobotSide
 from robot_side.drivers.mujoco.scene import Scene, load_scene
 from robot_side.drivers.mujoco.true_contact import TrueContact
-from robot_side.parts import build_parts
+from robot_side.parts import PERCEIVES, build_parts
 from robot_side.settings import RobotSettings
 from robot_side.tick import events
 
@@ -45,12 +44,18 @@ _LOOK_S: Final = 0.01
 _DONE_S: Final = 0.05
 _OF_PROCESSES: Final = {
     *("arm", "asymmetry", "audit", "bind", "cameras", "config", "connect", "connections", "console", "console_port"),
-    *("console_token", "controller", "device", "duration", "insecure", "keys", "law", "objects", "person"),
-    *("person_waits", "realtime", "record", "robot_key", "status", "summary", "tui", "view_bind", "view_connect"),
+    *("console_token", "controller", "device", "duration", "insecure", "keys", "law", "objects", "perception"),
+    *("person", "person_file", "person_waits", "realtime", "record", "robot_key", "status", "summary", "tui"),
+    *("view_bind", "view_connect"),
 }
 """Settings of processes, sockets and terminals, and those that are arguments of their own"""
 _SETTINGS: Final = (RobotSettings.__dataclass_fields__ | OperatorSettings.__dataclass_fields__).keys() - _OF_PROCESSES
 _Settings = TypeVar("_Settings", RobotSettings, OperatorSettings)
+_MOVES: Final = {
+    "command": "joint_velocity_rad_s, valid_until_s",
+    "command_gripper": "closing, valid_until_s",
+    "state": "now_s",
+}
 GRASPING: Final = "grasping"
 """Name of the built-in person, who grasps the target, lifts it and sets it down"""
 
@@ -108,9 +113,11 @@ class Episode:
         parts: RobotParts = build_parts(
             robot, 1, VIRTUAL_CLOCK, self.scene, law=None if isinstance(self.law, str) else self.law
         )
-        camera = _replaced("perception", self.perception, parts.camera, {"perceive": "now_s", "set_role": "name, role"})
-        methods = {"command": "joint_velocity_rad_s, valid_until_s", "state": "now_s"}
-        self.parts = replace(parts, camera=camera, arm=_replaced("arm", self.arm_port, parts.arm, methods))
+        self.parts = replace(
+            parts,
+            camera=made_of("perception", self.perception, parts.camera, PERCEIVES),
+            arm=made_of("arm", self.arm_port, parts.arm, _MOVES),
+        )
         self._sampler = None
         if self._sampled:
             self._sampler = Sampler(lambda: self.loop, self.scene, TrueContact(self.scene))
@@ -135,15 +142,11 @@ class Episode:
             about = person if isinstance(person, PersonSettings) else settings.person
             calibration, swap_sides = settings.calibration, settings.swap_sides
             return simulated_hands(self.device, about, settings.seed, calibration, swap_sides=swap_sides)
-        if isinstance(person, str | Path):
-            person = find("person", str(person), {GRASPING: PersonSettings()})
-        if isinstance(person, type) or (callable(person) and not hasattr(person, "act")):
-            person = person() if isinstance(person, type) else person(self.device)
+        if callable(person) and not isinstance(person, type) and not hasattr(person, "act"):
+            person = person(self.device)
         if hasattr(person, "tick"):
             return person
-        require_methods("person", person, {"act": "seen"})
-        assert isinstance(person, Actor)  # noqa: S101  # it has the method
-        return ArmingHands(self.device, person)
+        return ArmingHands(self.device, own_person(person))
 
     @property
     def time_s(self) -> float:
@@ -300,15 +303,3 @@ def _settings(kind: type[_Settings], base: _Settings | None, given: Mapping[str,
 def _load(settings: RobotSettings) -> Scene:
     name = settings.scene or "table"
     return load_scene(settings.model, settings.site, settings.roles, name, settings.seed, settings.site_axis)
-
-
-def _replaced(kind: str, given: object, simulated: Any, methods: dict[str, str]) -> Any:
-    """Return the part that `given`, a function or FILE.py, makes of the simulated one; that one if None."""
-    if given is None:
-        return simulated
-    made = find(kind, str(given), {}) if isinstance(given, str | Path) else given
-    if not callable(made):
-        raise ConfigurationError(f"{kind}: is a {type(made).__name__}; valid: a function that takes the simulated one")
-    part = made(simulated)
-    require_methods(kind, part, methods)
-    return part

@@ -11,6 +11,7 @@ from importlib import import_module
 from pathlib import Path
 
 from common.errors import ConfigurationError
+from common.plugged import find, known
 
 _QUESTIONS = Path(__file__).parents[1] / "lab" / "questions"
 
@@ -41,8 +42,10 @@ class Menu:
     def _answer(self, name: str, *rest: str) -> int:
         if name in self.questions:
             return self._ask(f"feelahead.lab.questions.{name}", name, rest)
+        if name in known("question"):
+            return self._answered(name, find("question", name, {}), rest)
         if not name.endswith(".py"):
-            valid = f"{', '.join(self.questions)}, or a question's file"
+            valid = f"{', '.join([*self.questions, *known('question')])}, or a question's file"
             raise ConfigurationError(f"{self.name} {name!r}: no such question; valid: {valid}")
         if not Path(name).is_file():
             raise ConfigurationError(
@@ -53,7 +56,7 @@ class Menu:
 
     def _ask(self, module: str, name: str, arguments: Sequence[str]) -> int:
         try:
-            sweep = import_module("feelahead.lab.sweep")
+            import_module("feelahead.lab.sweep")
             found = import_module(module)
         except (ImportError, SyntaxError) as error:
             reason = f"{error}; valid: a Python file that defines QUESTION"
@@ -65,7 +68,10 @@ class Menu:
             raise ConfigurationError(
                 f"{self.name} {name}: Python already has a module of this name; valid: a file with another name"
             )
-        question = getattr(found, "QUESTION", None)
+        return self._answered(name, getattr(found, "QUESTION", None), arguments)
+
+    def _answered(self, name: str, question: object, arguments: Sequence[str]) -> int:
+        sweep = import_module("feelahead.lab.sweep")
         if not isinstance(question, sweep.Question):
             raise ConfigurationError(
                 f"{self.name} {name}: the file defines no QUESTION; valid: QUESTION = Question(...)"

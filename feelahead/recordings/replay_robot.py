@@ -60,7 +60,12 @@ class _Given(Arm):
 def replay_robot(recording: Recording) -> Comparison:
     """Compute the robot side's messages again and compare them; ConfigurationError if the side was not recorded."""
     header = require_side(recording, "robot")
-    settings = settings_from(header["settings"], RobotSettings)
+    settings = replace(settings_from(header["settings"], RobotSettings), perception=None)  # its frames are recorded
+    if settings.law.endswith(".py"):  # a recording may be anybody's, and must run nobody's code
+        raise ConfigurationError(
+            f"recorded with the law of the file {settings.law}, which replay does not run; valid: a built-in law, or"
+            " one of an installed package; what works: feelahead replay without --check, export, plot"
+        )
     parts = build_parts(settings, header["epoch"], header["clock_domain"])
     given = _Given(parts.arm.joint_count)
     frames = FrameUnpacker(parts.camera.perceive(0.0))

@@ -8,8 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping
 from typing import TYPE_CHECKING, Final, Protocol, cast
 
-from common.errors import ConfigurationError
-from common.plugged import find, known
+from common.plugged import find, require_name
 
 if TYPE_CHECKING:
     from robot_side.laws.inputs import LawInputs
@@ -50,11 +49,9 @@ def make_law(law: object, inputs: LawInputs) -> NamedLaw:
     return OwnLaw(law if isinstance(law, str) else type(law).__name__, given, inputs)
 
 
-def require_name(name: str, built_in: Collection[str] = LAWS) -> None:
+def require_law(name: str, built_in: Collection[str] = LAWS) -> None:
     """Raise ConfigurationError unless `name` is a known law or a file; no file is read, and nobody's code is run."""
-    if name not in built_in and not name.endswith(".py") and name not in (others := known("law")):
-        names = ", ".join([*built_in, *others])
-        raise ConfigurationError(f"law {name!r}: there is no such law; valid: {names}, or a file such as ./mine.py")
+    require_name("law", name, built_in)
 
 
 def find_law(name: str) -> object:

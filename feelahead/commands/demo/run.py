@@ -107,7 +107,7 @@ def operator_arguments(
     if settings.tui or settings.status == "facts":
         arguments.append("--status=facts")
     always = (*given, "console", "console_port")
-    flags = _flags(settings, always, *_SHARED, "console", "console_port", "compensation", "haptics")
+    flags = _flags(settings, always, *_SHARED, "console", "console_port", "compensation", "haptics", "person_file")
     return [*arguments, *flags, *(() if page is None else page.flags(waits=_duration_s(settings) is None))]
 
 

@@ -10,7 +10,7 @@ from msgspec import Meta
 from common.command.run_options import RunOptions
 from common.limits import check_limits
 from common.protocol.messages import Compensation
-from robot_side.laws.named import require_name
+from robot_side.laws.named import require_law
 
 
 @dataclass(frozen=True)
@@ -54,6 +54,8 @@ class DemoSettings(RunOptions):
     """Site of the model between the fingertips, with the z axis along the approach."""
     site_axis: Literal["x", "-x", "y", "-y", "z", "-z"] = "z"
     """Axis of the site along which R2 advances. The start names the axis that fits the fingers, if another one does."""
+    person_file: Annotated[Path | None, tyro.conf.arg(metavar="FILE.py")] = None
+    """A person of your own instead of the scripted one (docs/python.md)."""
     realtime: bool = False
     """Ask for real-time scheduling and locked memory for both sides; if that is not permitted, they run as usual."""
     console: bool = True
@@ -71,14 +73,19 @@ class DemoSettings(RunOptions):
     def __post_init__(self) -> None:
         super().__post_init__()
         check_limits(self)
-        require_name(self.law)
+        require_law(self.law)
         if self.tui and self.status != "line":
             raise ValueError(f"--tui and --status {self.status} exclude each other; valid: only one of them")
         if self.scene is not None and self.model is not None:
             raise ValueError(
                 f"--scene {self.scene} and --model exclude each other, as a model has its own scene; valid: one of them"
             )
-        files = {"--model": self.model, "--robot-config": self.robot_config, "--operator-config": self.operator_config}
+        files = {
+            "--model": self.model,
+            "--person-file": self.person_file,
+            "--robot-config": self.robot_config,
+            "--operator-config": self.operator_config,
+        }
         for flag, path in files.items():
             if path is not None and not path.is_file():
                 raise ValueError(f"{flag} {path}: there is no such file; valid: an existing file")

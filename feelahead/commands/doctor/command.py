@@ -16,6 +16,7 @@ from rich.table import Table
 from rich.text import Text
 
 from common.command.command_line import parse_settings
+from common.plugged import Installed, installed
 from common.sockets.authentication import OperatorKeys
 from feelahead.commands.doctor import controllers, link, machine
 from feelahead.commands.doctor.finding import Finding, Verdict, can_be
@@ -115,7 +116,17 @@ def examine() -> list[Finding]:
         *machine.check_kernels(machine.kernel_facts()),
         *([machine.check_rendering(machine.rendering_troubles())] if "mujoco" not in absent else []),
         *machine.check_realtime(machine.realtime_notes()),
+        *(_plugged(part) for part in installed()),
     ]
+
+
+def _plugged(part: Installed) -> Finding:
+    """Return the finding of a part that an installed package registers."""
+    what = f"{part.kind} {part.name}"
+    if part.fault is None:
+        return Finding(what, Verdict.OK, f"of {part.package}")
+    remedy = f"mend or remove the package: pip uninstall {part.package.partition(' ')[0]}"
+    return Finding(what, Verdict.NOTE, f"left out: {part.package}: {part.fault}", remedy)
 
 
 def show(findings: list[Finding], console: Console) -> None:

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from typing import Final
 
 from common.protocol.messages import Compensation
-from robot_side.laws.named import require_name
+from robot_side.laws.named import require_law
 
 TriedLaw = str
 """Name of a law, one of `LAWS`, of an installed package, or a file"""
@@ -23,7 +23,7 @@ def require_tried(laws: Sequence[TriedLaw], flag: str, built_in: Sequence[TriedL
             f" {', '.join(built_in)}, each once"
         )
     for law in laws:
-        require_name(law, built_in)
+        require_law(law, built_in)
 
 
 def with_compensation(law: TriedLaw, compensation: Compensation) -> TriedLaw:

@@ -29,7 +29,7 @@ from robot_side.drivers.mujoco.checks.start_collision import start_collision
 from robot_side.drivers.mujoco.gripper_measurement import measure_gripper
 from robot_side.drivers.mujoco.robot_model import SiteAxis
 from robot_side.drivers.mujoco.scene import load_scene
-from robot_side.laws.named import require_name
+from robot_side.laws.named import require_law
 
 COLUMNS: Final = {
     "seed": ("seed", 0),
@@ -74,7 +74,7 @@ class DemoSettings(Sweep):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        require_name(self.law)
+        require_law(self.law)
         tick_period_s(self.tick_period)
         if self.person.pull_n is not None:
             raise ValueError(
