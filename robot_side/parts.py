@@ -76,7 +76,7 @@ class SceneParts(RobotParts):
 
         A scene's primitives stay the same during a run. The primitives of ignored objects count, too.
         """
-        seen = _as_loaded(self.scene, dict.fromkeys(self.scene.roles, Role.OBSTACLE))
+        seen = as_loaded(self.scene, dict.fromkeys(self.scene.roles, Role.OBSTACLE))
         unneeded = {kind.kernel for kind in KINDS if not (self.any_objects or len(getattr(seen, kind.owner)))}
         return [kernel for kernel in imported_kernels() if kernel not in unneeded]
 
@@ -119,7 +119,7 @@ def build_parts(
     camera = _camera(settings, scene, int(camera_noise))
     seen_elsewhere = None if drivers is None else drivers.objects(settings.roles, settings.camera.sd_m)
     # Before the first tick, as a search for spheres takes far longer than one.
-    first = _as_loaded(scene, scene.roles) if settings.objects is None else perceived([], [], 0.0)
+    first = as_loaded(scene, scene.roles) if settings.objects is None else perceived([], [], 0.0)
     held_covers = HeldCovers(first, settings.cover_m, scene.never_held, searching)
     joint_limits = limits.of_joints(arm.joint_count, *ends_rad, _slides(scene))
     surroundings = Surroundings()
@@ -239,7 +239,7 @@ def _notes(scene: Scene, settings: RobotSettings, travel: GripperTravel | None) 
     return tuple(notes)
 
 
-def _as_loaded(scene: Scene, roles: Mapping[str, Role]) -> PerceivedObjects:
+def as_loaded(scene: Scene, roles: Mapping[str, Role]) -> PerceivedObjects:
     """Return the objects as the scene starts, without the primitives of ignored objects."""
     nowhere = np.zeros((len(scene.objects), 3))
     return scene.primitives.perceived(0.0, roles, nowhere, scene.data.geom_xpos, scene.data.geom_xmat)

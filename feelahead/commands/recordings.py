@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import tyro
 from msgspec import Meta
@@ -14,12 +14,16 @@ from msgspec import Meta
 from common.command.command_line import parse_settings
 from common.errors import ConfigurationError, FeelaheadError
 from common.files.output_file import require_output_file
-from common.limits import Limited
+from common.limits import Limited, check_limits
 from common.recording.packages import require_packages
 from common.recording.reading import Recording, open_recording
+from common.units import parse_duration
+from feelahead.printing.progress import progress
 from feelahead.recordings.comparison import Comparison
 from feelahead.recordings.playback import require_protocol, require_statuses
+from robot_side.laws.named import require_law
 
+_Speed = Annotated[float, Meta(gt=0.0, le=1000.0)]
 _BOTH_SIDES = "install it in the clone: pip install '.[robot,operator,record]'"
 
 
@@ -68,14 +72,40 @@ class ExportSettings(Limited):
 
 @dataclass(frozen=True)
 class PlotSettings:
-    """Draw a run on one page."""
+    """Draw a run on one page; or, with --law, the strength of laws against the distance to what is ahead.
+
+    Try: feelahead plot --law swept paper ./mine.py --against distance --scene wall --out laws.png
+    """
 
     file: Annotated[Path | None, tyro.conf.Positional, tyro.conf.arg(metavar="FILE.mcap")] = None
     """The recording."""
     out: Path | None = None
-    """File to write, which ends in .png, .svg or .pdf; unless given, a .png beside the recording."""
+    """File to write, which ends in .png, .svg or .pdf; unless given, a .png beside the recording, or distance.png."""
+    law: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME|FILE.py...")] = ()
+    """Laws to draw, instead of a recording: swept, paper, or files of your own (docs/python.md)."""
+    against: Literal["distance"] = "distance"
+    """With --law: what the strength under the finger is drawn against."""
+    scene: Annotated[Literal["table", "wall", "slot", "shelf"] | None, tyro.conf.arg(metavar="NAME")] = None
+    """With --law: scene of the built-in arm, with what lies ahead of its gripper; unless given, the wall."""
+    model: Annotated[tuple[Path, ...], tyro.conf.arg(metavar="FILE.xml...")] = ()
+    """With --law: MJCF files, each with an arm and things ahead of its tool; a panel for each."""
+    site: Annotated[str, tyro.conf.arg(metavar="NAME")] = "tool"
+    """Name of the models' site between the fingertips."""
+    speeds: Annotated[tuple[_Speed, ...], tyro.conf.arg(metavar="MM/S...")] = (60.0, 240.0)
+    """With --law: constant speeds of the gripper along its approach axis."""
+    loop_age: Annotated[str, tyro.conf.arg(metavar="TIME")] = "100ms"
+    """With --law: loop age t_d, over which the motion is known (eq. 8)."""
+    seed: Annotated[int, Meta(ge=0)] = 0
+    """With --law: seed of the built-in scene."""
 
     def __post_init__(self) -> None:
+        check_limits(self)
+        if self.law and self.file is not None:
+            raise ValueError(f"{self.file} and --law exclude each other; valid: a recording, or laws")
+        if self.scene is not None and self.model:
+            raise ValueError("--scene and --model exclude each other; valid: one of them")
+        for law in self.law:
+            require_law(law)
         require_output_file("--out", self.out, (".png", ".svg", ".pdf"))
 
 
@@ -198,6 +228,8 @@ def _empty_folder(path: Path) -> Path:
 def plot(arguments: Sequence[str]) -> int:
     """Draw a recorded run on one page."""
     settings = parse_settings(PlotSettings, "feelahead plot", arguments)
+    if settings.law:
+        return _plot_laws(settings)
     with _recording(settings.file) as recording:
         out = recording.path.with_suffix(".png") if settings.out is None else settings.out
         require_packages("plot", "matplotlib", extra="experiments")
@@ -205,5 +237,30 @@ def plot(arguments: Sequence[str]) -> int:
         from feelahead.recordings.tables import read_tables  # noqa: PLC0415
 
         plot_run(recording, read_tables(recording), out)
+    sys.stdout.write(f"{out}\n")
+    return 0
+
+
+def _plot_laws(settings: PlotSettings) -> int:
+    require_packages("plot", "matplotlib", extra="experiments")
+    try:
+        from feelahead.both_sides.against_distance import Course, draw_courses, strength_against_distance  # noqa: PLC0415
+    except ModuleNotFoundError as error:
+        raise ConfigurationError(f"plot --law: {error.name} is not installed; {_BOTH_SIDES}") from error
+    places: dict[str, dict[str, Any]] = {
+        str(model): {"model": model, "site": settings.site, "seed": settings.seed} for model in settings.model
+    } or {settings.scene or "wall": {"scene": settings.scene or "wall", "seed": settings.seed}}
+    speeds_m_s = [1e-3 * speed for speed in settings.speeds]
+    loop_age_s = parse_duration(settings.loop_age, "--loop-age")
+    courses: dict[str, list[Course]] = {}
+    with progress("feelahead plot", float(len(places) * len(settings.law))) as shown:
+        for name, place in places.items():
+            courses[Path(name).stem] = found = []
+            for law in settings.law:
+                shown.begin(f"{Path(name).stem}, {law}")
+                found += strength_against_distance(law, speeds_m_s, loop_age_s=loop_age_s, **place)
+                shown.advance(1.0)
+    out = settings.out or Path("distance.png")
+    draw_courses(courses, out)
     sys.stdout.write(f"{out}\n")
     return 0

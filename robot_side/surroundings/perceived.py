@@ -1,7 +1,7 @@
 """Objects from the camera: spheres, boxes, tetrahedra, half-spaces, meshes and ellipsoids, each with a role."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Final, Protocol
 
 import numpy as np
@@ -75,6 +75,19 @@ class PerceivedObjects:
     """(k, 3) velocity of each object in the world frame. None if not measured; objects then count as at rest."""
     since: "tuple[SomeObjects, FloatArray] | None" = field(default=None, init=False, repr=False)
     """Movers that made this frame, and their numbers; None if any object may have moved"""
+
+
+def displaced(objects: PerceivedObjects, by_m: FloatArray) -> PerceivedObjects:
+    """Return the frame with every object moved by `by_m` (3,), in the world frame."""
+    return replace(
+        objects,
+        sphere_centers_m=objects.sphere_centers_m + by_m,
+        box_centers_m=objects.box_centers_m + by_m,
+        tetrahedron_vertices_m=objects.tetrahedron_vertices_m + by_m,
+        half_space_offsets_m=objects.half_space_offsets_m + objects.half_space_normals @ by_m,
+        mesh_positions_m=objects.mesh_positions_m + by_m,
+        ellipsoid_centers_m=objects.ellipsoid_centers_m + by_m,
+    )
 
 
 class SomeObjects(Protocol):

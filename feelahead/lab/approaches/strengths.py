@@ -24,7 +24,7 @@ from robot_side.laws.inputs import LawInputs
 from robot_side.laws.law import Law
 from robot_side.laws.named import make_law
 from robot_side.laws.swept import SweptLaw
-from robot_side.surroundings.perceived import PerceivedObjects
+from robot_side.surroundings.perceived import PerceivedObjects, displaced
 from robot_side.surroundings.surroundings import Surroundings
 from robot_side.tick.sensed import Sensed
 from robot_side.tick.situation import Situation
@@ -55,17 +55,8 @@ class Draw:
 
 def _moved(objects: PerceivedObjects, velocity_m_s: FloatArray, after_s: float) -> PerceivedObjects:
     """Return the frame after all objects moved with `velocity_m_s` (3,) for `after_s`; it contains this velocity."""
-    displacement_m = velocity_m_s * after_s
-    return replace(
-        objects,
-        sphere_centers_m=objects.sphere_centers_m + displacement_m,
-        box_centers_m=objects.box_centers_m + displacement_m,
-        tetrahedron_vertices_m=objects.tetrahedron_vertices_m + displacement_m,
-        half_space_offsets_m=objects.half_space_offsets_m + objects.half_space_normals @ displacement_m,
-        mesh_positions_m=objects.mesh_positions_m + displacement_m,
-        ellipsoid_centers_m=objects.ellipsoid_centers_m + displacement_m,
-        velocities_m_s=np.tile(velocity_m_s, (len(objects.names), 1)),
-    )
+    velocities_m_s = np.tile(velocity_m_s, (len(objects.names), 1))
+    return replace(displaced(objects, velocity_m_s * after_s), velocities_m_s=velocities_m_s)
 
 
 @dataclass(frozen=True)

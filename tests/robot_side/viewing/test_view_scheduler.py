@@ -158,7 +158,7 @@ def test_the_same_link_shows_whole_size_in_h264_and_another_codec_begins_where_i
 @pytest.mark.parametrize("law", ["swept", "paper"])
 def test_a_state_says_where_the_robot_side_believes_everything_is(law: str) -> None:
     camera = CameraSettings(mean_m=(0.01, -0.02, 0.005), sd_m=0.004)
-    table = Table(RobotSettings(camera=camera, law=law))  # type: ignore[arg-type]
+    table = Table(RobotSettings(camera=camera, law=law))
     table.watch(scene=True)
     table.run(0.5)
     state, [shapes] = table.states()[-1], table.shapes()
@@ -197,7 +197,7 @@ def test_a_state_says_where_the_robot_side_believes_everything_is(law: str) -> N
 
 @pytest.mark.parametrize("law", ["swept", "paper"])
 def test_overlaps_add_up_to_the_total_that_the_law_has(law: str) -> None:
-    table = Table(RobotSettings(camera=CameraSettings(mean_m=-0.01), law=law))  # type: ignore[arg-type]
+    table = Table(RobotSettings(camera=CameraSettings(mean_m=-0.01), law=law))
     table.run(0.1)
     core = table.robot
     assert core.newest is not None
