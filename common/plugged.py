@@ -7,8 +7,8 @@ points' group `feelahead.laws` (`feelahead.controllers` and so on). A file defin
 import sys
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
-from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
+from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from typing import Any, Final
 
@@ -68,19 +68,24 @@ def require_name(kind: str, name: str, built_in: Collection[str]) -> None:
 
 
 def load_file(kind: str, path: Path) -> object:
-    """Return what the Python file defines as `kind`; ConfigurationError if it cannot be loaded or defines none."""
+    """Return what the Python file defines as `kind`; ConfigurationError if it cannot be loaded or defines none.
+
+    The file is run anew in each call, so that a change counts. It may import files beside it.
+    """
     valid = f"a Python file that defines {kind}"
     if not path.is_file():
         raise ConfigurationError(f"{kind} {path}: there is no such file; valid: {valid}")
     folder = str(path.absolute().parent)
     if folder not in sys.path:
-        sys.path.insert(0, folder)  # for files beside it; worker processes get the same path
+        sys.path.append(folder)  # behind all others: no file beside it hides a module of Python's or ours
+    spec = spec_from_file_location(f"feelahead_{kind}_{path.stem}", path)
+    if spec is None or spec.loader is None:
+        raise ConfigurationError(f"{kind} {path}: cannot be loaded; valid: {valid}")
+    module = sys.modules[spec.name] = module_from_spec(spec)
     try:
-        module = import_module(path.stem)
+        spec.loader.exec_module(module)
     except Exception as error:  # anybody's code
         raise ConfigurationError(f"{kind} {path}: {_in_words(error)}") from error
-    if Path(module.__file__ or "").resolve() != path.resolve():
-        raise ConfigurationError(f"{kind} {path}: Python already has a module of this name; valid: another file name")
     if not hasattr(module, kind):
         raise ConfigurationError(f"{kind} {path}: the file defines no {kind}; valid: {valid}")
     part: object = getattr(module, kind)
