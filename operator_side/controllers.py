@@ -1,6 +1,6 @@
 """Table of the controllers that --device selects, and how each is opened. A new controller needs a line here.
 
-Others come from packages and files (`common.plugged`): a function without arguments that opens one, or raises
+Others come from packages and files (`common.files.plugged`): a function without arguments that opens one, or raises
 DeviceError, whose text says what to do; it is called again until it succeeds.
 """
 
@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping
 from typing import Final, NamedTuple
 
 from common.errors import ConfigurationError, DeviceError
-from common.plugged import find, require_methods
+from common.files.plugged import find, require_methods
 from operator_side.controller.background_writes import BackgroundWrites
 from operator_side.controller.port import Controller, OpenController
 from operator_side.controller.search import BackgroundSearch, Ready

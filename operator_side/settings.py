@@ -9,8 +9,8 @@ import tyro
 from msgspec import Meta
 
 from common.command.run_options import SideOptions
+from common.files.plugged import require_name
 from common.limits import check_limits
-from common.plugged import require_name
 from common.protocol.messages import Compensation
 from common.sockets.round_robin import CONNECTIONS, MOST_CONNECTIONS_EACH
 from operator_side.controller.port import check_choice

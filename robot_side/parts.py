@@ -9,7 +9,7 @@ import numpy as np
 
 from common.arrays import BoolArray, FloatArray
 from common.errors import ConfigurationError
-from common.plugged import made_of
+from common.files.plugged import made_of
 from common.protocol.link_end import LinkEnd
 from common.roles import Role
 from common.timing.ages import LoopAge

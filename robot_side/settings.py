@@ -9,8 +9,8 @@ import tyro
 from msgspec import Meta
 
 from common.command.run_options import SideOptions
+from common.files.plugged import require_name
 from common.limits import check_limits, check_value
-from common.plugged import require_name
 from common.roles import Role
 from robot_side.arm.tool_motion import ToolMotionSettings
 from robot_side.drivers.mujoco.built_in_scenes import SceneName

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from common.arrays import FloatArray
 from common.command.command_line import settings_of
 from common.errors import ConfigurationError, FeelaheadError
-from common.plugged import made_of
+from common.files.plugged import made_of
 from common.protocol.view_messages import ViewName
 from feelahead.both_sides.history import Contact, History, Sampler
 from feelahead.both_sides.loopback import VIRTUAL_CLOCK, Loopback, Person
@@ -108,6 +108,9 @@ class Episode:
         named = {"law": self.law} if isinstance(self.law, str) else {}
         self.settings = robot = _settings(RobotSettings, self._bases[0], self._given | named)
         self.operator_settings = _settings(OperatorSettings, self._bases[1], self._given)
+        if (robot.model is None) != (robot.site is None):
+            given, missing = ("model", "site") if robot.site is None else ("site", "model")
+            raise ConfigurationError(f"Episode: {given} is given without {missing}; valid: both, or neither")
         load = self._world or _load
         self.scene = load(robot)
         parts: RobotParts = build_parts(

@@ -17,7 +17,8 @@ if TYPE_CHECKING:
     from robot_side.drivers.mujoco.scene import Scene
     from robot_side.drivers.mujoco.true_contact import TrueContact
 
-PERIOD_S: Final = 0.01
+PERIOD_S: Final = 0.008
+"""Time from one sample to the next: two turns"""
 _AXES: Final = {
     "_m": ("x", "y", "z"),
     "strengths": tuple(map(str, range(1, 11))),
@@ -41,7 +42,7 @@ class Contact:
 
 @dataclass(frozen=True)
 class History:
-    """Samples of an episode, every 10 ms. Along a trigger's axis L2 comes first, then R2. NaN: unknown."""
+    """Samples of an episode, every 8 ms. Along a trigger's axis L2 comes first, then R2. NaN: unknown."""
 
     time_s: FloatArray
     """(n,) virtual time, which both sides share"""

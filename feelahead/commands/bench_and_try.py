@@ -11,7 +11,7 @@ from importlib import import_module
 from pathlib import Path
 
 from common.errors import ConfigurationError
-from common.plugged import find, known
+from common.files.plugged import find, known
 
 _QUESTIONS = Path(__file__).parents[1] / "lab" / "questions"
 

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from common.plugged import find, require_methods
+from common.files.plugged import find, require_methods
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.hands.travel_calibration import TravelCalibration
 from operator_side.people.arming_hands import ArmingHands, constant_force

@@ -1,6 +1,6 @@
 """Laws by name, each imported on first use. To add a law here, add its file and one entry.
 
-Other laws come from installed packages, and from files: see `common.plugged`.
+Other laws come from installed packages, and from files: see `common.files.plugged`.
 """
 
 from __future__ import annotations
@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping
 from typing import TYPE_CHECKING, Final, Protocol, cast
 
-from common.plugged import find, require_name
+from common.files.plugged import find, require_name
 
 if TYPE_CHECKING:
     from robot_side.laws.inputs import LawInputs

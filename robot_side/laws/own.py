@@ -3,7 +3,7 @@
 from typing import Any, Final
 
 from common.errors import ConfigurationError
-from common.plugged import require_methods
+from common.files.plugged import require_methods
 from common.protocol.around import Around
 from common.protocol.view_messages import EnlargementTerms
 from robot_side.arm.port import GripperPose

@@ -53,7 +53,7 @@ ARROWS = """
     robot_side/gripper: common common/files robot_side/arm robot_side/overlap/meshes robot_side/surroundings
     robot_side/tick: common common/protocol robot_side/arm robot_side/surroundings
     robot_side/drivers/remote: common common/sockets/door common/timing robot_side/arm robot_side/surroundings
-    robot_side/laws: common common/protocol robot_side/arm robot_side/enlargement robot_side/field
+    robot_side/laws: common common/files common/protocol robot_side/arm robot_side/enlargement robot_side/field
         robot_side/surroundings robot_side/tick
     robot_side/drivers/mujoco: common common/files common/protocol robot_side/arm robot_side/compiled
         robot_side/gripper robot_side/overlap/meshes robot_side/surroundings robot_side/surroundings/kinds
@@ -63,16 +63,17 @@ ARROWS = """
         robot_side/operators robot_side/tick
     robot_side/outcome: common robot_side/tick robot_side/tick/truth.py
     robot_side/recording: common common/recording robot_side/arm robot_side/surroundings robot_side/tick
-    robot_side/laws/named.py: robot_side/laws robot_side/tick
+    robot_side/laws/named.py: common/files robot_side/laws robot_side/tick
     robot_side/drivers/mujoco/checks: common robot_side/arm robot_side/drivers/mujoco
     robot_side/core: common common/protocol common/status common/timing robot_side/arm robot_side/gripper
         robot_side/laws robot_side/operators robot_side/outcome robot_side/reporting robot_side/surroundings
         robot_side/tick
     robot_side/viewing: common common/companion common/protocol common/realtime robot_side/drivers/mujoco
         robot_side/operators robot_side/surroundings robot_side/tick
-    robot_side/settings.py: common common/command robot_side/arm robot_side/drivers/mujoco robot_side/enlargement
-        robot_side/laws/named.py robot_side/operators robot_side/viewing
-    robot_side/parts.py: common common/protocol common/timing robot_side/arm robot_side/compiled robot_side/core
+    robot_side/settings.py: common common/command common/files robot_side/arm robot_side/drivers/mujoco
+        robot_side/enlargement robot_side/laws/named.py robot_side/operators robot_side/viewing
+    robot_side/parts.py: common common/files common/protocol common/timing robot_side/arm robot_side/compiled
+        robot_side/core robot_side/laws
         robot_side/drivers/mujoco robot_side/drivers/mujoco/checks robot_side/drivers/remote robot_side/gripper
         robot_side/laws/named.py robot_side/operators robot_side/settings.py robot_side/surroundings
     robot_side: common common/command common/emulation common/files common/loop common/protocol common/recording
@@ -94,13 +95,13 @@ ARROWS = """
     operator_side/events.py: operator_side/controller operator_side/robot_link
     operator_side/feel: common common/protocol common/status operator_side/controller operator_side/hands
     operator_side/calibration: common common/files operator_side/controller operator_side/hands
-    operator_side/people: common common/protocol common/status operator_side/calibration operator_side/controller
-        operator_side/dualsense/simulated operator_side/hands
+    operator_side/people: common common/files common/protocol common/status operator_side/calibration
+        operator_side/controller operator_side/dualsense/simulated operator_side/hands
     operator_side/core_settings.py: common common/protocol operator_side/feel operator_side/hands
     operator_side/core.py: common common/protocol common/status operator_side/controller operator_side/core_settings.py
         operator_side/events.py operator_side/feel operator_side/hands operator_side/robot_link
-    operator_side/settings.py: common common/command common/protocol common/sockets operator_side/controller
-        operator_side/feel operator_side/hands operator_side/people
+    operator_side/settings.py: common common/command common/files common/protocol common/sockets
+        operator_side/controller operator_side/feel operator_side/hands operator_side/people
     operator_side/viewing/facts.py: common/protocol common/status
     operator_side/viewing/terminal: common common/command common/companion common/status operator_side/controller
         operator_side/viewing/facts.py
@@ -111,7 +112,7 @@ ARROWS = """
     operator_side/viewing: common common/command common/protocol common/rate common/recording common/status
         operator_side/controller operator_side/core.py operator_side/settings.py operator_side/viewing/console
         operator_side/viewing/facts.py operator_side/viewing/pages
-    operator_side: common common/command common/emulation common/loop common/protocol common/recording
+    operator_side: common common/command common/emulation common/files common/loop common/protocol common/recording
         common/sockets common/status operator_side/calibration operator_side/controller operator_side/core.py
         operator_side/core_settings.py operator_side/dualsense/hid operator_side/dualsense/simulated
         operator_side/evdev operator_side/events.py operator_side/hands operator_side/people
@@ -123,10 +124,11 @@ ARROWS = """
     feelahead/containers: common/* feelahead/both_sides
     feelahead/printing: common
     feelahead/lab: common/* robot_side/* operator_side/* feelahead/both_sides feelahead/containers feelahead/printing
-    feelahead/commands/bench_and_try.py: common feelahead/lab
+    feelahead/commands/bench_and_try.py: common common/files feelahead/lab
     feelahead/commands: common/* robot_side/compiled robot_side/drivers/mujoco robot_side/laws/named.py
         robot_side/viewing operator_side/* feelahead/both_sides feelahead/printing feelahead/recordings
     feelahead: common/*
+    feelahead/__init__.py: common/* robot_side/* operator_side/* feelahead/both_sides
 """
 """One row for each room: the room, and the rooms that it may import.
 

@@ -16,7 +16,7 @@ from rich.table import Table
 from rich.text import Text
 
 from common.command.command_line import parse_settings
-from common.plugged import Installed, installed
+from common.files.plugged import Installed, installed
 from common.sockets.authentication import OperatorKeys
 from feelahead.commands.doctor import controllers, link, machine
 from feelahead.commands.doctor.finding import Finding, Verdict, can_be

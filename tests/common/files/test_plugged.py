@@ -1,19 +1,19 @@
 import importlib
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 
-from common import plugged
 from common.errors import ConfigurationError
-from common.plugged import find, installed, known, made_of, require_methods, require_name
+from common.files import plugged
+from common.files.plugged import find, installed, known, made_of, require_methods, require_name
 
 Write = Callable[[str, str], Path]
 
 
 @pytest.fixture
-def write(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Write:
+def write(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Write]:
     """Return a function that writes a file of somebody's; what it imports is forgotten afterwards."""
     monkeypatch.setattr(sys, "path", [*sys.path])
     before = set(sys.modules)
@@ -23,13 +23,13 @@ def write(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Write:
         path.write_text(content, encoding="utf-8")
         return path
 
-    yield write  # type: ignore[misc]
+    yield write
     for name in set(sys.modules) - before:
         del sys.modules[name]
 
 
 @pytest.fixture
-def package(write: Write, monkeypatch: pytest.MonkeyPatch) -> None:
+def package(write: Write) -> None:
     """An installed package that registers a law that works, one that is broken, and a controller."""
     module = write("somebodys_package.py", "law = 'a law'\n")
     write("somebodys_broken_package.py", "import none_such\n")

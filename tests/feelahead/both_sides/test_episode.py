@@ -1,0 +1,173 @@
+"""Episodes as a script of somebody's runs them, and what a wrong argument is told."""
+
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import feelahead
+from common.errors import ConfigurationError, FeelaheadError
+from common.recording.reading import open_recording
+from feelahead import Episode, FingerInput, LawInputs, Seen
+from robot_side.settings import CameraSettings
+from robot_side.surroundings.perceived import ObjectSource, PerceivedObjects
+from robot_side.tick.sensed import Sensed
+from robot_side.tick.situation import Situation
+from tests.helpers.repository import DATA
+
+WALL: dict[str, Any] = {"scene": "wall", "link": "delay 100ms", "seed": 3}
+
+
+class Nearest:
+    """Law: the stiffer the nearer, at any speed."""
+
+    def __init__(self, inputs: LawInputs) -> None:
+        self.inputs = inputs
+
+    def sense(self, situation: Situation, now_s: float) -> Sensed:
+        del now_s
+        return self.inputs.sensed(situation, l2=0.0, r2=1.0 - self.inputs.nearest_m(situation, 0.08) / 0.08)
+
+
+class Retreats:
+    """Person who pulls R2 until it resists, draws back, and has finished."""
+
+    felt_s: float | None = None
+
+    def act(self, seen: Seen) -> FingerInput | None:
+        if self.felt_s is None:
+            if seen.strengths[1] < 4:
+                return FingerInput(r2_n=2.0)
+            self.felt_s = seen.since_s
+        return FingerInput(l2_n=2.0) if seen.since_s < self.felt_s + 0.5 else None
+
+
+class Lagging:
+    """Perception that shows what was half a second ago."""
+
+    def __init__(self, camera: ObjectSource) -> None:
+        self.camera, self.frames = camera, list[tuple[float, PerceivedObjects]]()
+        self.set_role = camera.set_role
+
+    def perceive(self, now_s: float) -> PerceivedObjects:
+        self.frames.append((now_s, self.camera.perceive(now_s)))
+        while len(self.frames) > 1 and self.frames[1][0] <= now_s - 0.5:
+            self.frames.pop(0)
+        return self.frames[0][1]
+
+
+def test_a_finger_of_two_newtons_stops_with_haptics_and_hits_without() -> None:
+    felt, blind = (Episode(**WALL, haptics=haptics).arm().step(5.0, r2_n=2.0) for haptics in (True, False))
+    assert felt.contacts == ()
+    assert felt.history.true_gap_m.min() > 0.005
+    assert felt.history.strength[:, 1].max() == 8.0
+    (contact,) = blind.contacts
+    assert contact.thing == "wall"
+    assert contact.speed_m_s == pytest.approx(0.12, abs=0.01)
+    assert np.nanmax(blind.history.contact_speed_m_s) == contact.speed_m_s
+
+
+def test_the_history_has_one_time_base_and_names_its_axes() -> None:
+    episode = Episode(**WALL).arm().step(0.5, r2_n=2.0, left_stick=(0.3, 0.0))
+    history = episode.history
+    assert np.diff(history.time_s) == pytest.approx(0.008)
+    assert {len(getattr(history, field.name)) for field in fields(history)} == {len(history.time_s)}
+    assert not history.armed[0]
+    assert history.armed[-1]
+    assert history.tool_position_m[-1] == pytest.approx(episode.tool_position_m, abs=2e-3)
+    assert history.loop_age_s[-1] == pytest.approx(0.21, abs=0.03)
+    frame = history.to_pandas()
+    assert list(frame.columns[:5]) == ["time_s", "armed", "tool_position_m_x", "tool_position_m_y", "tool_position_m_z"]
+    assert frame["strengths_r2_10"].to_numpy() == pytest.approx(history.strengths[:, 1, 9])
+    assert frame["onset_distances_m_l2_1"].to_numpy() == pytest.approx(history.onset_distances_m[:, 0, 0])
+
+
+def test_the_same_seed_gives_the_same_numbers_again_and_another_seed_others() -> None:
+    episode = Episode(**WALL)
+    runs = [episode.reset(seed).arm().step(1.0, r2_n=2.0).history.onset_distances_m[-1] for seed in (3, 3, 4)]
+    assert np.array_equal(runs[0], runs[1])
+    assert not np.array_equal(runs[0], runs[2])
+
+
+def test_a_law_a_person_a_perception_and_an_arm_of_somebodys_own_are_used() -> None:
+    made: list[Any] = []
+
+    def arm(simulated: Any) -> Any:
+        made.append(simulated)
+        return simulated
+
+    episode = Episode(**WALL, law=Nearest, person=Retreats, perception=Lagging, arm=arm).run(seconds=20.0)
+    assert episode.done
+    assert episode.contacts == ()
+    history = episode.history
+    assert set(np.unique(history.strength[:, 1])) >= {1.0, 2.0, 3.0}  # not at once, as with swept
+    assert history.tool_position_m[-1, 0] < history.tool_position_m[:, 0].max() - 0.02
+    assert len(made) == 1
+
+
+def test_the_scripted_person_does_the_task_and_says_that_it_is_done() -> None:
+    episode = Episode(person="grasping").run()
+    assert episode.done
+    assert episode.summary()["task"]["lifted_mm"] > 50.0
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"law": "swep"}, "law 'swep': there is no such law; valid: swept, paper"),
+        ({"law": 3}, "law int: is a int; valid: a class or function that takes a LawInputs"),
+        ({"law": lambda inputs: inputs}, "LawInputs lacks sense(situation, now_s)"),
+        ({"law": lambda inputs: inputs.none}, "cannot be made from the law's inputs: AttributeError"),
+        ({"scene": "wal"}, 'scene = "wal"; valid: "table" or "wall" or "slot" or "shelf"'),
+        ({"model": "none.xml", "site": "tool"}, "none.xml: there is no such file"),
+        ({"model": DATA / "wall.xml"}, "Episode: model is given without site; valid: both, or neither"),
+        ({"gravity": 1.0, "bind": ""}, "Episode: bind, gravity: no such setting; valid: arm, assist"),
+        ({"link": "delay x"}, "delay: 'x' is no duration"),
+        ({"probability": 1.0}, "probability"),
+        ({"person": object()}, "person: object lacks act(seen)"),
+        ({"perception": 3}, "perception: is a int; valid: a function that takes the simulated one"),
+        ({"arm": lambda _: None}, "arm: NoneType lacks command(joint_velocity_rad_s, valid_until_s)"),
+    ],
+)
+def test_a_wrong_argument_is_refused_at_once_with_what_is_valid(given: dict[str, Any], said: str) -> None:
+    with pytest.raises(ConfigurationError) as refused:
+        Episode(**given)
+    assert said in str(refused.value)
+
+
+def test_settings_of_a_side_may_be_given_as_texts_tables_or_records() -> None:
+    for camera in ({"sd_m": 0.001}, CameraSettings(sd_m=0.001)):
+        assert Episode(scene="wall", camera=camera, sampled=False).settings.camera.sd_m == 0.001
+
+
+def test_what_cannot_be_is_said_when_it_is_asked() -> None:
+    episode = Episode(sampled=False, link="delay 2s")
+    with pytest.raises(FeelaheadError, match="was not armed within 30 s over --link 'delay 2s'"):
+        episode.arm()
+    with pytest.raises(ValueError, match="not sampled; valid: Episode"):
+        _ = episode.history
+    with pytest.raises(ValueError, match="no history yet; valid: after arm"):
+        _ = Episode().history
+    with pytest.raises(ValueError, match="seconds = nan; valid: a number from 0 on"):
+        episode.step(float("nan"))
+    with pytest.raises(ValueError, match="valid: before it begins"):
+        episode.record("late.mcap")
+
+
+def test_an_episode_is_recorded_as_the_sides_record_it(tmp_path: Path) -> None:
+    with Episode(**WALL).record(tmp_path / "run.mcap") as episode:
+        episode.arm().step(1.0, r2_n=2.0)
+    recording = open_recording(tmp_path / "run.mcap")
+    assert recording.whole
+    assert {"robot", "operator"} == recording.headers.keys()
+    assert len(list(recording.messages(("/stiffness",)))) > 50
+
+
+def test_the_face_has_few_names_each_of_which_is_there() -> None:
+    assert len(feelahead.__all__) <= 15
+    for name in feelahead.__all__:
+        assert getattr(feelahead, name) is not None
+    with pytest.raises(AttributeError, match="has no attribute 'Epsiode'; valid: Arm, "):
+        _ = feelahead.Epsiode
