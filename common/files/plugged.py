@@ -52,7 +52,7 @@ def find(kind: str, name: str, built_in: Mapping[str, object]) -> object:
     try:
         part: object = found[name].load()
     except Exception as error:  # a package of somebody else's
-        raise ConfigurationError(f"{kind} {name}, of {_package(found[name])}: {_in_words(error)}") from error
+        raise ConfigurationError(f"{kind} {name}, of {_package(found[name])}: {fault_in_words(error)}") from error
     return part
 
 
@@ -85,7 +85,7 @@ def load_file(kind: str, path: Path) -> object:
     try:
         spec.loader.exec_module(module)
     except Exception as error:  # anybody's code
-        raise ConfigurationError(f"{kind} {path}: {_in_words(error)}") from error
+        raise ConfigurationError(f"{kind} {path}: {fault_in_words(error)}") from error
     if not hasattr(module, kind):
         raise ConfigurationError(f"{kind} {path}: the file defines no {kind}; valid: {valid}")
     part: object = getattr(module, kind)
@@ -105,7 +105,7 @@ def made_of(kind: str, given: object, simulated: Any, methods: Mapping[str, str]
     try:
         part = makes(simulated)
     except Exception as error:  # anybody's code
-        raise ConfigurationError(f"{kind}: {_in_words(error)}") from error
+        raise ConfigurationError(f"{kind}: {fault_in_words(error)}") from error
     require_methods(kind, part, methods)
     return part
 
@@ -119,7 +119,7 @@ def installed() -> list[Installed]:
             try:
                 point.load()
             except Exception as error:  # a package of somebody else's
-                fault = _in_words(error)
+                fault = fault_in_words(error)
             found.append(Installed(kind, point.name, _package(point), fault))
     return found
 
@@ -147,8 +147,8 @@ def _package(point: EntryPoint) -> str:
     return "a package" if point.dist is None else f"{point.dist.name} {point.dist.version}"
 
 
-def _in_words(error: Exception) -> str:
-    """Return the error in one line, with the line of the file where it arose."""
+def fault_in_words(error: Exception) -> str:
+    """Return an error of somebody's code in one line, with the line of the file where it arose."""
     line = next(
         (f", line {number}" for number in [getattr(error, "lineno", None)] if number is not None),
         _line_of(error),

@@ -2,6 +2,8 @@
 
 from typing import Final, Literal
 
+from common.errors import FeelaheadError
+from common.files.plugged import fault_in_words
 from common.protocol.messages import Telemetry, Vector2
 from common.status.codes import Doing
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
@@ -79,7 +81,15 @@ class ArmingHands:
         self.began_s = now_s if self.began_s is None else self.began_s
         device = self._device
         felt = device.travel, device.strength, device.rumble.left
-        hands = self.person.act(Seen(now_s - self.began_s, screen, *felt, delay_s))
+        try:
+            hands = self.person.act(Seen(now_s - self.began_s, screen, *felt, delay_s))
+        except Exception as error:  # perhaps somebody else's code
+            raise FeelaheadError(f"person {type(self.person).__name__}: {fault_in_words(error)}") from error
+        if not isinstance(hands, FingerInput | None):
+            raise FeelaheadError(
+                f"person {type(self.person).__name__}: act returned a {type(hands).__name__}; valid: a FingerInput, or"
+                " None when the person has finished"
+            )
         if hands is None:
             self._enter("done", now_s)
         self._hold(hands or FingerInput(), Action.CLOSE_GRIPPER if self._grips else None)

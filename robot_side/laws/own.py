@@ -2,8 +2,8 @@
 
 from typing import Any, Final
 
-from common.errors import ConfigurationError
-from common.files.plugged import require_methods
+from common.errors import ConfigurationError, FeelaheadError
+from common.files.plugged import fault_in_words, require_methods
 from common.protocol.around import Around
 from common.protocol.view_messages import EnlargementTerms
 from robot_side.arm.port import GripperPose
@@ -29,16 +29,19 @@ class OwnLaw:
         try:
             self._law = given(inputs) if makes else given
         except Exception as error:  # anybody's code
-            said = f"{type(error).__name__}: {error}"
+            said = fault_in_words(error)
             raise ConfigurationError(f"law {name}: cannot be made from the law's inputs: {said}") from error
         require_methods(f"law {name}", self._law, {"sense": "situation, now_s"})
         self._name = name
 
     def sense(self, situation: Situation, now_s: float) -> Sensed:
-        """Return the law's result; TypeError if it is none."""
-        sensed = self._law.sense(situation, now_s)
+        """Return the law's result; FeelaheadError if it fails, or the result is none: the run ends, and says why."""
+        try:
+            sensed = self._law.sense(situation, now_s)
+        except Exception as error:  # anybody's code
+            raise FeelaheadError(f"law {self._name}: {fault_in_words(error)}") from error
         if not isinstance(sensed, Sensed):
-            raise TypeError(
+            raise FeelaheadError(
                 f"law {self._name}: sense returned a {type(sensed).__name__}; valid: a Sensed, as inputs.sensed makes"
             )
         return sensed

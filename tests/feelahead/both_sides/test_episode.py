@@ -44,6 +44,21 @@ class Retreats:
         return FingerInput(l2_n=2.0) if seen.since_s < self.felt_s + 0.5 else None
 
 
+class Failing:
+    """Law and person with a fault: they fail, or return something else."""
+
+    def __init__(self, returns: object = None) -> None:
+        self.returns = returns
+
+    def sense(self, situation: Situation, now_s: float) -> object:
+        del situation, now_s
+        return 1 / 0 if self.returns is None else self.returns
+
+    def act(self, seen: Seen) -> object:
+        del seen
+        return 1 / 0 if self.returns is None else self.returns
+
+
 class Lagging:
     """Perception that shows what was half a second ago."""
 
@@ -135,6 +150,29 @@ def test_a_wrong_argument_is_refused_at_once_with_what_is_valid(given: dict[str,
     with pytest.raises(ConfigurationError) as refused:
         Episode(**given)
     assert said in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        (
+            {"law": lambda _: Failing()},
+            r"^law function: ZeroDivisionError, test_episode.py line \d+: division by zero$",
+        ),
+        (
+            {"law": lambda _: Failing(3)},
+            r"^law function: sense returned a int; valid: a Sensed",
+        ),
+        (
+            {"person": lambda _: Failing()},
+            r"^person Failing: ZeroDivisionError, test_episode.py line \d+: division by zero",
+        ),
+        ({"person": lambda _: Failing(3)}, r"^person Failing: act returned a int; valid: a FingerInput"),
+    ],
+)
+def test_a_law_or_a_person_that_fails_ends_the_run_with_its_name_and_line(given: dict[str, Any], said: str) -> None:
+    with pytest.raises(FeelaheadError, match=said):
+        Episode(**WALL, **given).run(seconds=3.0)
 
 
 def test_settings_of_a_side_may_be_given_as_texts_tables_or_records() -> None:

@@ -11,7 +11,9 @@ from feelahead.commands.demo.compare import page_of
 from feelahead.commands.demo.settings import DemoSettings
 
 
-@pytest.mark.parametrize("flag", ["--no-haptics", "--compensation=robot", "--tui", "--record=run.mcap", "--status=json"])
+@pytest.mark.parametrize(
+    "flag", ["--no-haptics", "--compensation=robot", "--tui", "--record=run.mcap", "--status=json"]
+)
 def test_what_means_nothing_here_is_refused(flag: str) -> None:
     with pytest.raises(ConfigurationError, match=r"with --compare; valid: --compare, --config"):
         demo(["--compare", flag])
