@@ -4,16 +4,18 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, Self, TypeVar
+from typing import TYPE_CHECKING, Any, Final, Self
 
 import numpy as np
 import numpy.typing as npt
 
 from common.arrays import FloatArray
-from common.command.command_line import settings_of
+from common.emulation.spec import LinkSpec
 from common.errors import ConfigurationError, FeelaheadError
 from common.files.plugged import made_of
+from common.link_model import LinkProfile
 from common.protocol.view_messages import ViewName
+from feelahead.both_sides.episode_settings import link_clauses, require_settings, side_settings
 from feelahead.both_sides.history import Contact, History, Sampler
 from feelahead.both_sides.loopback import VIRTUAL_CLOCK, Loopback, Person
 from operator_side import events as operator_events
@@ -42,15 +44,6 @@ if TYPE_CHECKING:
 LONGEST_ARMING_S: Final = 30.0
 _LOOK_S: Final = 0.01
 _DONE_S: Final = 0.05
-_OF_PROCESSES: Final = {
-    *("arm", "asymmetry", "audit", "bind", "cameras", "config", "connect", "connections", "console", "console_port"),
-    *("console_token", "controller", "device", "duration", "insecure", "keys", "law", "objects", "perception"),
-    *("person", "person_file", "person_waits", "realtime", "record", "robot_key", "status", "summary", "tui"),
-    *("view_bind", "view_connect"),
-}
-"""Settings of processes, sockets and terminals, and those that are arguments of their own"""
-_SETTINGS: Final = (RobotSettings.__dataclass_fields__ | OperatorSettings.__dataclass_fields__).keys() - _OF_PROCESSES
-_Settings = TypeVar("_Settings", RobotSettings, OperatorSettings)
 _MOVES: Final = {
     "command": "joint_velocity_rad_s, valid_until_s",
     "command_gripper": "closing, valid_until_s",
@@ -70,6 +63,7 @@ class Episode:
         self,
         *,
         law: object = None,
+        link: str | LinkProfile | Mapping[str, LinkProfile] = "",
         person: object = None,
         perception: object = None,
         arm: object = None,
@@ -86,6 +80,7 @@ class Episode:
         """Build both sides. `settings` are the flags of both sides by their names, such as scene, model, site, link,
         seed, haptics, probability or compensation; those that both have go to both.
 
+        link: netem's words, a profile for both directions, or profiles by name, such as `to_robot` (`LinkSpec`).
         law: a name, a FILE.py, or an object (`robot_side.laws.own.OwnLaw`). person: who acts in `step` and `run`: an
         object with `act` (`operator_side.people.port.Person`), a FILE.py, `grasping`, PersonSettings, or what makes one
         from the controller. perception, arm: functions that get the simulated camera, or arm, and return the one to
@@ -94,9 +89,9 @@ class Episode:
         ConfigurationError names a setting that is unknown or out of range, and what is valid.
         """
         self._given = {name: value for name, value in settings.items() if value is not None}
-        if unknown := self._given.keys() - _SETTINGS:
-            valid = ", ".join(sorted(_SETTINGS | {"law", "person", "perception", "arm"}))
-            raise ConfigurationError(f"Episode: {', '.join(sorted(unknown))}: no such setting; valid: {valid}")
+        self._given |= {"link": link} if isinstance(link, str) and link else {}
+        self._link = None if isinstance(link, str) else link_clauses(link)
+        require_settings(self._given)
         self.law, self.person, self.perception, self.arm_port = law, person, perception, arm
         self._device, self._world, self._pages = device, world, pages
         self._bases = robot, operator
@@ -106,8 +101,8 @@ class Episode:
 
     def _build(self) -> None:
         named = {"law": self.law} if isinstance(self.law, str) else {}
-        self.settings = robot = _settings(RobotSettings, self._bases[0], self._given | named)
-        self.operator_settings = _settings(OperatorSettings, self._bases[1], self._given)
+        self.settings = robot = side_settings(RobotSettings, self._bases[0], self._given | named)
+        self.operator_settings = side_settings(OperatorSettings, self._bases[1], self._given)
         if (robot.model is None) != (robot.site is None):
             given, missing = ("model", "site") if robot.site is None else ("site", "model")
             raise ConfigurationError(f"Episode: {given} is given without {missing}; valid: both, or neither")
@@ -134,7 +129,13 @@ class Episode:
         self._inputs = FingerInput()
         self._idle = ArmingHands(self.device, Pulling(lambda _: self._inputs))
         self.hands: Person = self._hands_of(self.person)
-        self.loop = Loopback(robot_side, operator, self.device, self.hands, robot, self.operator_settings, self._pages)
+        self.loop = Loopback(
+            robot_side, operator, self.device, self.hands, robot, self.operator_settings, self._pages, self._link_spec()
+        )
+
+    def _link_spec(self) -> LinkSpec | None:
+        settings = self.settings
+        return None if self._link is None else LinkSpec(self._link, settings.seed, settings.link_model)
 
     def _hands_of(self, person: object) -> Person:
         """Return the hands at the controller for a person in any form; ConfigurationError for something else."""
@@ -296,11 +297,6 @@ class Episode:
             f"the robot was not armed{grip} within {LONGEST_ARMING_S:g} s over --link {self.settings.link!r}: {why}"
             f"loop age {robot.loop_age_s(self.time_s):.2f} s, {robot.session.motion_received} commands arrived"
         )
-
-
-def _settings(kind: type[_Settings], base: _Settings | None, given: Mapping[str, Any]) -> _Settings:
-    mine = {name: value for name, value in given.items() if name in kind.__dataclass_fields__}
-    return settings_of(mine, kind, "Episode") if base is None else replace(base, **mine)
 
 
 def _load(settings: RobotSettings) -> Scene:

@@ -8,7 +8,7 @@ from typing import Any, Protocol
 
 from common.clock import MonotonicClock, VirtualClock
 from common.emulation.delay_line import DelayLine, link_summary
-from common.emulation.spec import Stream
+from common.emulation.spec import LinkSpec, Stream
 from common.emulation.tuned import tuned_link
 from common.protocol.messages import Telemetry
 from common.statistics import RunningStatistics, microseconds
@@ -50,10 +50,11 @@ class Loopback:
         robot_settings: RobotSettings,
         operator_settings: OperatorSettings,
         pages: DrivingPage | None = None,
+        link: LinkSpec | None = None,
     ) -> None:
         """device: the controller, which the person holds. The settings have links, seeds and the turns' periods.
 
-        pages: the console's pages, from which an emergency stop or tuning may come.
+        pages: the console's pages, from which an emergency stop or tuning may come. link: instead of theirs.
         """
         self.clock = VirtualClock()
         self.robot, self.operator, self.device, self.person = robot, operator, device, person
@@ -61,7 +62,7 @@ class Loopback:
         self.pages = pages or DrivingPage(may_drive=False)
         self._tick_s, self._motion_s = robot_settings.tick_period_s(), operator_settings.tick_period_s()
         self.tick_time = RunningStatistics(robot_settings.seed)
-        self._there, self._back = operator_settings.link_spec(), robot_settings.link_spec()
+        self._there, self._back = link or operator_settings.link_spec(), link or robot_settings.link_spec()
         self._to_robot: DelayLine[bytes] = DelayLine(self._there.profile("to_robot"))
         self._to_operator: dict[Stream, DelayLine[bytes]] = {
             stream: DelayLine(self._back.profile("to_operator", stream)) for stream in _STREAMS

@@ -10,7 +10,7 @@ import pytest
 import feelahead
 from common.errors import ConfigurationError, FeelaheadError
 from common.recording.reading import open_recording
-from feelahead import Episode, FingerInput, LawInputs, Seen
+from feelahead import Episode, FingerInput, LawInputs, LinkProfile, Seen
 from robot_side.settings import CameraSettings
 from robot_side.surroundings.perceived import ObjectSource, PerceivedObjects
 from robot_side.tick.sensed import Sensed
@@ -122,6 +122,14 @@ def test_a_law_a_person_a_perception_and_an_arm_of_somebodys_own_are_used() -> N
     assert len(made) == 1
 
 
+def test_a_link_is_given_in_words_as_a_profile_or_as_one_for_each_direction() -> None:
+    profile = LinkProfile(delay_s=0.1)
+    links = "delay 100ms", profile, {"to_robot": profile, "to_operator": profile}
+    ends = [Episode(link=link, seed=3).arm().step(1.0, r2_n=2.0).tool_position_m for link in links]
+    assert ends[0] == pytest.approx(ends[1], abs=0.0)
+    assert ends[0] == pytest.approx(ends[2], abs=0.0)
+
+
 def test_the_scripted_person_does_the_task_and_says_that_it_is_done() -> None:
     episode = Episode(person="grasping").run()
     assert episode.done
@@ -140,6 +148,7 @@ def test_the_scripted_person_does_the_task_and_says_that_it_is_done() -> None:
         ({"model": DATA / "wall.xml"}, "Episode: model is given without site; valid: both, or neither"),
         ({"gravity": 1.0, "bind": ""}, "Episode: bind, gravity: no such setting; valid: arm, assist"),
         ({"link": "delay x"}, "delay: 'x' is no duration"),
+        ({"link": 0.1}, "Episode: link is a float; valid: netem's words, a LinkProfile, or LinkProfiles by name"),
         ({"probability": 1.0}, "probability"),
         ({"person": object()}, "person: object lacks act(seen)"),
         ({"perception": 3}, "perception: is a int; valid: a function that takes the simulated one"),

@@ -1,0 +1,44 @@
+"""Settings of an episode: those of both sides by their names, without what only processes have."""
+
+from collections.abc import Collection, Mapping
+from dataclasses import replace
+from typing import Any, Final, TypeVar
+
+from common.command.command_line import settings_of
+from common.errors import ConfigurationError
+from common.link_model import LinkProfile
+from operator_side.settings import OperatorSettings
+from robot_side.settings import RobotSettings
+
+_Settings = TypeVar("_Settings", RobotSettings, OperatorSettings)
+_OF_PROCESSES: Final = {
+    *("arm", "asymmetry", "audit", "bind", "cameras", "config", "connect", "connections", "console", "console_port"),
+    *("console_token", "controller", "device", "duration", "insecure", "keys", "law", "objects", "perception"),
+    *("person", "person_file", "person_waits", "realtime", "record", "robot_key", "status", "summary", "tui"),
+    *("view_bind", "view_connect"),
+}
+"""Settings of processes, sockets and terminals, and those that are arguments of their own"""
+_SETTINGS: Final = (RobotSettings.__dataclass_fields__ | OperatorSettings.__dataclass_fields__).keys() - _OF_PROCESSES
+
+
+def require_settings(names: Collection[str]) -> None:
+    """Raise ConfigurationError if a name is no setting of an episode."""
+    if unknown := set(names) - _SETTINGS:
+        valid = ", ".join(sorted(_SETTINGS | {"law", "person", "perception", "arm"}))
+        raise ConfigurationError(f"Episode: {', '.join(sorted(unknown))}: no such setting; valid: {valid}")
+
+
+def side_settings(kind: type[_Settings], base: _Settings | None, given: Mapping[str, Any]) -> _Settings:
+    """Return a side's settings: those of `given` that it has, on top of `base`; ConfigurationError for a bad value."""
+    mine = {name: value for name, value in given.items() if name in kind.__dataclass_fields__}
+    return settings_of(mine, kind, "Episode") if base is None else replace(base, **mine)
+
+
+def link_clauses(link: LinkProfile | Mapping[str, LinkProfile]) -> Mapping[str, LinkProfile]:
+    """Return the clauses of a `LinkSpec`; ConfigurationError for something else."""
+    clauses = {"": link} if isinstance(link, LinkProfile) else link
+    if not isinstance(clauses, Mapping) or not all(isinstance(one, LinkProfile) for one in clauses.values()):
+        raise ConfigurationError(
+            f"Episode: link is a {type(link).__name__}; valid: netem's words, a LinkProfile, or LinkProfiles by name"
+        )
+    return clauses
