@@ -46,7 +46,7 @@ def make_law(law: object, inputs: LawInputs) -> NamedLaw:
         return cast("Callable[[LawInputs], NamedLaw]", given)(inputs)
     from robot_side.laws.own import OwnLaw  # noqa: PLC0415
 
-    return OwnLaw(law if isinstance(law, str) else type(law).__name__, given, inputs)
+    return OwnLaw(law if isinstance(law, str) else getattr(law, "__name__", type(law).__name__), given, inputs)
 
 
 def require_law(name: str, built_in: Collection[str] = LAWS) -> None:
