@@ -78,7 +78,7 @@ class History:
 
     def to_pandas(self) -> Any:
         """Return a pandas.DataFrame with a column a number, such as `tool_position_m_x` or `strengths_r2_10`."""
-        import pandas as pd  # type: ignore[import-untyped]  # noqa: PLC0415  # its users have it
+        import pandas as pd  # noqa: PLC0415  # its users have it
 
         columns: dict[str, Any] = {}
         for field in fields(self):

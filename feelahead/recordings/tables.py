@@ -5,7 +5,7 @@ and one clock, so that it can be plotted at once. Each of its rows has the newes
 """
 
 import csv
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
@@ -73,6 +73,10 @@ class Table:
         """Return a column as numbers; NaN for missing values and texts."""
         return _numbers(self.values(name), len(self.rows))
 
+    def to_pandas(self) -> Any:
+        """Return a pandas.DataFrame with the time since the recording began as its index."""
+        return _frame(self, self.times_s)
+
     def sorted(self) -> "Table":
         """Return the table sorted by time; messages of the two sides are recorded slightly out of order."""
         order = np.argsort(np.array(self.times_s), kind="stable")
@@ -101,6 +105,17 @@ class Joined:
     def numbers(self, name: str) -> FloatArray:
         """Return a column as numbers; NaN for missing values and texts."""
         return _numbers(self.values(name), len(self.times_s))
+
+    def to_pandas(self) -> Any:
+        """Return a pandas.DataFrame with the time since the recording began as its index."""
+        return _frame(self, self.times_s)
+
+
+def _frame(table: "Table | Joined", times_s: Sequence[float] | FloatArray) -> Any:
+    import pandas as pd  # noqa: PLC0415  # its users have it
+
+    values = {name: list(table.values(name)) for name in table.columns()}
+    return pd.DataFrame(values, index=pd.Index(times_s, name=TIME))
 
 
 def _numbers(values: Iterator[Any], count: int) -> FloatArray:
