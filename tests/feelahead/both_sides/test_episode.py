@@ -166,11 +166,11 @@ def test_a_wrong_argument_is_refused_at_once_with_what_is_valid(given: dict[str,
     [
         (
             {"law": lambda _: Failing()},
-            r"^law function: ZeroDivisionError, test_episode.py line \d+: division by zero$",
+            r"^law <lambda>: ZeroDivisionError, test_episode.py line \d+: division by zero$",
         ),
         (
             {"law": lambda _: Failing(3)},
-            r"^law function: sense returned a int; valid: a Sensed",
+            r"^law <lambda>: sense returned a int; valid: a Sensed",
         ),
         (
             {"person": lambda _: Failing()},
