@@ -3,13 +3,12 @@
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from common.arrays import BoolArray, FloatArray
 from common.errors import ConfigurationError
-from common.files.plugged import made_of
 from common.protocol.link_end import LinkEnd
 from common.roles import Role
 from common.timing.ages import LoopAge
@@ -47,14 +46,13 @@ from robot_side.operators.operator_session import OperatorSession
 from robot_side.operators.safety import Safety
 from robot_side.operators.tuning import Tuning
 from robot_side.settings import RobotSettings
+from robot_side.surroundings.own_perception import perceived_by
 from robot_side.surroundings.perceived import KINDS, PerceivedObjects
 from robot_side.surroundings.surroundings import Surroundings
 
 if TYPE_CHECKING:
     from robot_side.laws.named import NamedLaw
 
-PERCEIVES: Final = {"perceive": "now_s", "set_role": "name, role"}
-"""Methods of an ObjectSource"""
 _NAMED_OBJECTS = 8
 """Maximum number of objects that a note names"""
 
@@ -135,7 +133,7 @@ def build_parts(
     return SceneParts(
         arm=arm,
         kinematics=kinematics,
-        camera=seen_elsewhere or made_of("perception", settings.perception, camera, PERCEIVES),
+        camera=seen_elsewhere or perceived_by(settings.perception, camera),
         law=law,
         explains=law,
         surroundings=surroundings,

@@ -89,7 +89,7 @@ def draw_courses(courses: dict[str, list[Course]], out: Path) -> None:
     mpl.use("Agg")
     from matplotlib import pyplot  # noqa: PLC0415
 
-    columns = min(len(courses), 3)
+    columns = min(len(courses), 4)
     rows = -(-len(courses) // columns)
     laws = list(dict.fromkeys(one.law for found in courses.values() for one in found))
     speeds = list(dict.fromkeys(one.speed_m_s for found in courses.values() for one in found))
@@ -103,7 +103,8 @@ def draw_courses(courses: dict[str, list[Course]], out: Path) -> None:
             label = f"{Path(one.law).stem}, {1e3 * one.speed_m_s:.0f} mm/s"
             axis.step(1e3 * one.distance_m, one.strength, color=looks[0], linestyle=looks[1], where="post", label=label)
         axis.set(title=place, ylim=(-0.3, 8.3))
-        axis.invert_xaxis()
+        axis.tick_params(labelbottom=True)
+    axes.flat[0].invert_xaxis()  # of all, as they share it
     figure.supxlabel("way to the contact (mm)")
     figure.supylabel("strength under the finger (of 8)")
     axes.flat[0].legend(fontsize=7)

@@ -34,8 +34,9 @@ from robot_side.core.robot_parts import RobotParts
 from robot_side.core.robot_side import RobotSide
 from robot_side.drivers.mujoco.scene import Scene, load_scene
 from robot_side.drivers.mujoco.true_contact import TrueContact
-from robot_side.parts import PERCEIVES, build_parts
+from robot_side.parts import build_parts
 from robot_side.settings import RobotSettings
+from robot_side.surroundings.own_perception import perceived_by
 from robot_side.tick import events
 
 if TYPE_CHECKING:
@@ -113,7 +114,7 @@ class Episode:
         )
         self.parts = replace(
             parts,
-            camera=made_of("perception", self.perception, parts.camera, PERCEIVES),
+            camera=perceived_by(self.perception, parts.camera),
             arm=made_of("arm", self.arm_port, parts.arm, _MOVES),
         )
         self._sampler = None

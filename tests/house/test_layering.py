@@ -47,7 +47,8 @@ ARROWS = """
     robot_side/overlap: common robot_side/compiled robot_side/overlap/checks robot_side/overlap/meshes
         robot_side/overlap/precise robot_side/overlap/solids
     robot_side/surroundings/kinds: common robot_side/compiled robot_side/overlap/meshes robot_side/overlap/solids
-    robot_side/surroundings: common robot_side/compiled robot_side/overlap/meshes robot_side/surroundings/kinds
+    robot_side/surroundings: common common/files robot_side/compiled robot_side/overlap/meshes
+        robot_side/surroundings/kinds
     robot_side/field: common robot_side/arm robot_side/compiled robot_side/enlargement robot_side/surroundings
         robot_side/surroundings/kinds
     robot_side/gripper: common common/files robot_side/arm robot_side/overlap/meshes robot_side/surroundings
@@ -72,7 +73,7 @@ ARROWS = """
         robot_side/operators robot_side/surroundings robot_side/tick
     robot_side/settings.py: common common/command common/files robot_side/arm robot_side/drivers/mujoco
         robot_side/enlargement robot_side/laws/named.py robot_side/operators robot_side/viewing
-    robot_side/parts.py: common common/files common/protocol common/timing robot_side/arm robot_side/compiled
+    robot_side/parts.py: common common/protocol common/timing robot_side/arm robot_side/compiled
         robot_side/core robot_side/laws
         robot_side/drivers/mujoco robot_side/drivers/mujoco/checks robot_side/drivers/remote robot_side/gripper
         robot_side/laws/named.py robot_side/operators robot_side/settings.py robot_side/surroundings

@@ -10,6 +10,7 @@ import pytest
 import feelahead
 from common.errors import ConfigurationError, FeelaheadError
 from common.recording.reading import open_recording
+from common.roles import Role
 from feelahead import Episode, FingerInput, LawInputs, LinkProfile, Seen
 from robot_side.settings import CameraSettings
 from robot_side.surroundings.perceived import ObjectSource, PerceivedObjects
@@ -45,7 +46,7 @@ class Retreats:
 
 
 class Failing:
-    """Law and person with a fault: they fail, or return something else."""
+    """Law, person and perception with a fault: they fail, or return something else."""
 
     def __init__(self, returns: object = None) -> None:
         self.returns = returns
@@ -53,6 +54,12 @@ class Failing:
     def sense(self, situation: Situation, now_s: float) -> object:
         del situation, now_s
         return 1 / 0 if self.returns is None else self.returns
+
+    def perceive(self, now_s: float) -> object:
+        del now_s
+        return 1 / 0 if self.returns is None else self.returns
+
+    def set_role(self, name: str, role: Role) -> None: ...
 
     def act(self, seen: Seen) -> object:
         del seen
@@ -164,6 +171,8 @@ def test_a_wrong_argument_is_refused_at_once_with_what_is_valid(given: dict[str,
 @pytest.mark.parametrize(
     ("given", "said"),
     [
+        ({"perception": Failing}, r"^perception Failing: perceive returned a MujocoCamera; valid: a PerceivedObjects"),
+        ({"perception": lambda _: Failing()}, r"^perception Failing: ZeroDivisionError, test_episode.py line \d+: "),
         (
             {"law": lambda _: Failing()},
             r"^law <lambda>: ZeroDivisionError, test_episode.py line \d+: division by zero$",
@@ -179,7 +188,9 @@ def test_a_wrong_argument_is_refused_at_once_with_what_is_valid(given: dict[str,
         ({"person": lambda _: Failing(3)}, r"^person Failing: act returned a int; valid: a FingerInput"),
     ],
 )
-def test_a_law_or_a_person_that_fails_ends_the_run_with_its_name_and_line(given: dict[str, Any], said: str) -> None:
+def test_a_law_a_person_or_a_perception_that_fails_ends_the_run_with_its_name_and_line(
+    given: dict[str, Any], said: str
+) -> None:
     with pytest.raises(FeelaheadError, match=said):
         Episode(**WALL, **given).run(seconds=3.0)
 
