@@ -188,9 +188,7 @@ def test_a_wrong_argument_is_refused_at_once_with_what_is_valid(given: dict[str,
         ({"person": lambda _: Failing(3)}, r"^person Failing: act returned a int; valid: a FingerInput"),
     ],
 )
-def test_a_law_a_person_or_a_perception_that_fails_ends_the_run_with_its_name_and_line(
-    given: dict[str, Any], said: str
-) -> None:
+def test_a_part_that_fails_ends_the_run_with_its_name_and_line(given: dict[str, Any], said: str) -> None:
     with pytest.raises(FeelaheadError, match=said):
         Episode(**WALL, **given).run(seconds=3.0)
 
