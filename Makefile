@@ -13,7 +13,7 @@ export PYTHONDONTWRITEBYTECODE :=
 
 # A file that is only half made is made again.
 .DELETE_ON_ERROR:
-.PHONY: audit figures demo mutants sbom test quick types test-kernel test-two-hosts wide-area test-containers test-console test-quiet soak pictures driving latency-experiment lock clean
+.PHONY: audit figures demo mutants sbom test quick types test-kernel test-two-hosts wide-area test-containers test-console test-quiet soak pictures notebook driving latency-experiment lock clean
 
 PIP = $(BIN)/python -m pip install --disable-pip-version-check
 PIP_LOG = $(VENV)/pip.log
@@ -95,6 +95,9 @@ test-quiet: $(VENV)/.installed $(VENV)/.kernels ## what is judged by millisecond
 # Needs Chromium, and a machine with nothing else to do: its runs are real ones.
 pictures: $(VENV)/.installed $(VENV)/.kernels ## the documents' pictures of console and terminal view, made anew
 	$(BIN)/python -m tests.console.pictures $(ARGS)
+
+notebook: $(VENV)/.installed $(VENV)/.kernels ## examples/first_episode.ipynb from tests/examples/first_episode.md, executed anew
+	$(BIN)/python -m tests.examples.notebook
 
 # An hour and more, on a machine with nothing else to do. A stopped run goes on; a new commit starts anew.
 figures/haptics.csv: asks = try haptics --seeds 10
