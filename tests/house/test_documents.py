@@ -1,11 +1,12 @@
 """The commands in the documents exist and accept their arguments, and the examples run."""
 
+import doctest
 import re
 import shlex
 import textwrap
 import tomllib
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, get_type_hints
 
@@ -17,6 +18,7 @@ import feelahead.main
 import operator_side.main
 import robot_side.main
 from common.command.command_line import load_toml
+from feelahead.both_sides.history import History
 from feelahead.commands import keys
 from feelahead.commands.bench_and_try import bench, try_out
 from feelahead.commands.demo.settings import DemoSettings
@@ -174,6 +176,26 @@ def test_the_python_in_the_readme_runs() -> None:
         assert (given["volumes"] > 0.0).all()
 
 
+def test_the_code_in_the_python_guide_is_of_the_examples_or_runs() -> None:
+    guide = Document.read(ROOT / "docs" / "python.md")
+    examples = [path.read_text(encoding="utf-8") for path in sorted((ROOT / "examples").glob("*.py"))]
+    shape = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
+    given: dict[str, Any] = {"centers": np.zeros((2, 3)), "radii": np.ones(2), "vertices": np.stack([shape, shape])}
+    others = [code for code in guide.fences("python") if not any(code in example for example in examples)]
+    assert len(others) == 1
+    exec(others[0], given)  # noqa: S102  # the guide's own lines
+    assert given["volumes"].shape == given["areas"].shape == (2,)
+    assert given["gradients"].shape == (2, 3)
+    assert (given["volumes"] > 0.0).all()
+    for session in guide.fences("pycon"):
+        test = doctest.DocTestParser().get_doctest(session, {}, "docs/python.md", None, None)
+        said: list[str] = []
+        doctest.DocTestRunner().run(test, out=said.append)
+        assert said == []
+    named = re.findall(r"^\| `(\w+)` \| \(n", guide.text, re.MULTILINE)
+    assert named == [field.name for field in fields(History)]
+
+
 def test_the_guide_for_two_machines_is_in_order_and_the_readme_says_the_same() -> None:
     """Only the order and the texts of the commands are checked here; `make test-two-hosts` runs them."""
     said = [(step.where, step.command.split(maxsplit=3)[:3]) for step in steps()]
@@ -187,6 +209,7 @@ def test_the_guide_for_two_machines_is_in_order_and_the_readme_says_the_same() -
 
 
 _BLOCK = re.compile(r"(?:(?<=\n\n)|\A)((?:(?: {4}.*)?\n)+)")
+_FENCE = re.compile(r"^```(\w*)\n(.*?)^```\n", re.DOTALL | re.MULTILINE)
 _SPAN = re.compile(r"`((?:feelahead|feelahead-robot|feelahead-operator|make)(?:\s[^`]*)?)`")
 _AN_OPTION = re.compile(r"\[--[^\]]*\]")
 
@@ -199,8 +222,12 @@ class Document:
     def read(cls, path: Path) -> "Document":
         return cls(path.read_text(encoding="utf-8"))
 
+    def fences(self, language: str) -> list[str]:
+        return [code for kind, code in _FENCE.findall(self.text) if kind == language]
+
     def blocks(self) -> list[str]:
-        return [block for found in _BLOCK.finditer(self.text) if (block := textwrap.dedent(found[1]).strip("\n"))]
+        text = _FENCE.sub("\n", self.text)
+        return [block for found in _BLOCK.finditer(text) if (block := textwrap.dedent(found[1]).strip("\n"))]
 
     def spans(self) -> list[str]:
         return [" ".join(found[1].split()) for found in _SPAN.finditer(self.text)]
