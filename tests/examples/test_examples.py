@@ -15,8 +15,8 @@ from tests.helpers.python_process import ended
 from tests.helpers.repository import ROOT
 
 EXAMPLES = ROOT / "examples"
+README = ROOT / "README.md"
 SAYS = {
-    "first_episode.py": r"False: hits the wall at 1\d\d mm/s\n.*True: least gap 1\d\.\d mm\n",
     "haptics_off_and_on.py": r"off: hits the wall at 1\d\d mm/s\nhaptics on: hits nothing\n",
     "own_law.py": r"swept: [^\n]* 0 contacts[^\n]*\nnearness: [^\n]* 0 contacts",
     "own_link.py": r"delay: loop age [89]\d ms[^\n]*\ntrace: loop age 1\d\d ms",
@@ -48,6 +48,13 @@ def test_an_example_says_what_it_shows_and_writes_only_what_it_is_told(
     assert [path.name for path in tmp_path.iterdir()] == [*filter(None, [WRITES.get(name)])]
 
 
+def test_the_first_episode_prints_what_the_readme_says(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    said = run("first_episode.py", tmp_path, monkeypatch, capsys)
+    assert f"```text\n{said}```\n" in README.read_text(encoding="utf-8")
+
+
 @pytest.mark.processes
 def test_seeds_run_in_several_processes(tmp_path: Path) -> None:
     picture = tmp_path / "gaps.png"
@@ -64,7 +71,7 @@ def test_a_part_of_ones_own_is_found_in_its_example(kind: str) -> None:
 
 def test_every_example_is_short_and_tested() -> None:
     lengths = {path.name: len(path.read_text(encoding="utf-8").splitlines()) for path in EXAMPLES.glob("*.py")}
-    assert lengths.keys() == {*SAYS, "twenty_seeds.py"}
+    assert lengths.keys() == {*SAYS, "first_episode.py", "twenty_seeds.py"}
     assert {name: length for name, length in lengths.items() if length > 40} == {}
 
 

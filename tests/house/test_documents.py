@@ -143,8 +143,9 @@ def test_every_command_is_known(name: str) -> None:
             require_known(split)
 
 
-def test_the_readme_lists_every_command_benchmark_and_experiment() -> None:
-    [section] = re.findall(r"## Every command\n(.*?)\n## ", (ROOT / README).read_text(), re.DOTALL)
+def test_every_command_benchmark_and_experiment_is_listed() -> None:
+    text = (ROOT / "docs" / "commands.md").read_text(encoding="utf-8")
+    [section] = re.findall(r"## Every command\n(.*?)\n## ", text, re.DOTALL)
     named = {name.partition(" ")[0] for name in re.findall(r"`([a-z-]+(?: NAME)?)`", section)}
     assert named >= feelahead.main._COMMANDS.keys()
     for menu in (bench, try_out):
@@ -152,8 +153,8 @@ def test_the_readme_lists_every_command_benchmark_and_experiment() -> None:
         assert set(listed.replace("\n", " ").split(", ")) == menu.questions.keys()
 
 
-def test_the_settings_in_the_readme_are_settings(tmp_path: Path) -> None:
-    blocks = [block for block in Document.read(ROOT / README).blocks() if is_toml(block)]
+def test_the_settings_of_a_robot_are_settings(tmp_path: Path) -> None:
+    blocks = [block for block in Document.read(ROOT / "docs" / "robots.md").blocks() if is_toml(block)]
     assert blocks
     for block in blocks:
         path = tmp_path / "settings.toml"
@@ -163,17 +164,18 @@ def test_the_settings_in_the_readme_are_settings(tmp_path: Path) -> None:
         load_toml(path, kinds[0])
 
 
-def test_the_python_in_the_readme_runs() -> None:
-    blocks = [block for block in Document.read(ROOT / README).blocks() if block.startswith("from ")]
-    assert blocks
-    shape = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
-    for block in blocks:
-        vertices = np.stack([shape, 2.0 * shape])
-        given: dict[str, Any] = {"centers": np.zeros((2, 3)), "radii": np.ones(2), "vertices": vertices}
-        exec(block, given)  # noqa: S102  # the README's own lines
-        assert given["volumes"].shape == given["areas"].shape == (2,)
-        assert given["gradients"].shape == (2, 3)
-        assert (given["volumes"] > 0.0).all()
+def test_the_readme_fits_on_one_screen_and_has_the_first_episode_as_it_is() -> None:
+    readme = Document.read(ROOT / README)
+    assert len(readme.text.splitlines()) <= 100
+    assert readme.fences("python") == [(ROOT / "examples" / "first_episode.py").read_text(encoding="utf-8")]
+
+
+def test_the_citation_has_the_version_and_the_paper_of_the_readme() -> None:
+    citation = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    assert f"\nversion: {project['version']}\n" in citation
+    [paper] = re.findall(r"^    title: (.*)$", citation, re.MULTILINE)
+    assert paper in " ".join((ROOT / README).read_text(encoding="utf-8").split())
 
 
 def test_the_code_in_the_python_guide_is_of_the_examples_or_runs() -> None:
@@ -196,16 +198,12 @@ def test_the_code_in_the_python_guide_is_of_the_examples_or_runs() -> None:
     assert named == [field.name for field in fields(History)]
 
 
-def test_the_guide_for_two_machines_is_in_order_and_the_readme_says_the_same() -> None:
+def test_the_guide_for_two_machines_is_in_order() -> None:
     """Only the order and the texts of the commands are checked here; `make test-two-hosts` runs them."""
     said = [(step.where, step.command.split(maxsplit=3)[:3]) for step in steps()]
     made = [(where, split[2]) for where, split in said if split[:2] == ["feelahead", "keys"]]
     assert made == [("robot", "make"), ("operator", "make"), ("robot", "allow")]
     assert [where for where, split in said if split[0] == f"feelahead-{where}"] == ["robot", "operator"]
-    section = (ROOT / README).read_text(encoding="utf-8").partition("## On two machines")[2].partition("\n## ")[0]
-    commands = [line.strip() for line in section.splitlines() if line.startswith("    ")]
-    assert len(commands) > 5
-    assert set(commands) <= {step.command for step in steps()}
 
 
 _BLOCK = re.compile(r"(?:(?<=\n\n)|\A)((?:(?: {4}.*)?\n)+)")
