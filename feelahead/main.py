@@ -12,10 +12,9 @@ _COMMANDS: dict[str, tuple[str, str]] = {
         "doctor.command:doctor",
         "find what is missing on this machine, or wrong on the path to a robot side, with the remedy",
     ),
-    "calibrate": ("calibrate:calibrate", "measure where a controller's triggers and sticks begin and end"),
-    "feel": (
-        "feel.command:feel",
-        "feel the triggers' zones with a controller alone, or measure their forces with a kitchen scale",
+    "controller": (
+        "controller.command:controller",
+        "a controller alone: feel its zones, calibrate it, measure its forces",
     ),
     "keys": ("keys:keys", "who may operate the robot side: make key pairs, allow, list and revoke"),
     "virtual-dualsense": (
@@ -32,6 +31,11 @@ _COMMANDS: dict[str, tuple[str, str]] = {
     ),
 }
 """By its name: where each command is, as a module of feelahead.commands and a function, and its help"""
+_MOVED = {
+    "calibrate": "feelahead controller --calibrate",
+    "feel": "feelahead controller (with --measure-forces for --measure)",
+}
+"""Former commands, and what does the same now"""
 
 
 def command(arguments: Sequence[str]) -> int:
@@ -45,6 +49,8 @@ def command(arguments: Sequence[str]) -> int:
         )
         return 0
     name, *rest = arguments
+    if name in _MOVED:
+        raise ConfigurationError(f"{name} is part of another command now: {_MOVED[name]}")
     if name not in _COMMANDS:
         raise ConfigurationError(f"unknown command {name!r}; valid: {', '.join(_COMMANDS)}")
     module, _, function = _COMMANDS[name][0].partition(":")

@@ -45,7 +45,9 @@ class StoredTravel:
         for text in _forces(controller.address):
             self._note(text)
         if stored is None:
-            self._note("the controller's travel has not been calibrated; to calibrate it: feelahead calibrate")
+            self._note(
+                "the controller's travel has not been calibrated; to calibrate it: feelahead controller --calibrate"
+            )
         else:
             self._note(f"the controller's calibration: {calibration_path(controller.address)}")
 

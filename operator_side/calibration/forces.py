@@ -13,7 +13,7 @@ from operator_side.controller.feel import MAX_STRENGTH
 STRENGTHS: Final = MAX_STRENGTH + 1
 """Number of measured strengths: 0, the spring alone, to 8"""
 LARGEST_N: Final = 50.0
-_MEND: Final = "measure it again with: feelahead feel --measure; or delete the file"
+_MEND: Final = "measure it again with: feelahead controller --measure-forces; or delete the file"
 
 
 @dataclass(frozen=True)
@@ -83,7 +83,9 @@ def write_forces(path: Path, address: str, forces: ControllerForces) -> None:
     for name, trigger in (("l2", forces.l2), ("r2", forces.r2)):
         if trigger is not None:
             lines += ["", f"[{name}]", f"pulls_n = {[round(pull_n, 3) for pull_n in trigger.pulls_n]}"]
-    made_by = "Forces at which one controller's triggers yielded, in newtons. Made by: feelahead feel --measure"
+    made_by = (
+        "Forces at which one controller's triggers yielded, in newtons. Made by: feelahead controller --measure-forces"
+    )
     write_controller_file(path, "forces", address, made_by, lines)
 
 

@@ -130,6 +130,10 @@ class CalibrationProcedure:
             return min(1.0, min(len(sectors) for sectors in self._sectors) / _ENOUGH_SECTORS)
         return 1.0 if self.step is Step.DONE else self._rest.progress
 
+    def resume(self) -> None:
+        """Go on after a loss of the controller: a second of rest begins again, and so does the wait for the step."""
+        self._rest, self._since_s = RestMeasurement(), None
+
     def feed(self, state: ControllerState, now_s: float) -> None:
         """Take one state of the controller; nothing happens after the last step.
 

@@ -8,7 +8,7 @@ from common.errors import ConfigurationError
 from operator_side.calibration.controller_file import controller_file, read_controller_file, write_controller_file
 from operator_side.hands.travel_calibration import StickRest, TravelCalibration, TriggerTravel
 
-_MEND: Final = "to measure again: feelahead calibrate; to use the defaults: delete the file"
+_MEND: Final = "to measure again: feelahead controller --calibrate; to use the defaults: delete the file"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -61,5 +61,7 @@ def write_calibration(path: Path, address: str, calibration: TravelCalibration) 
     lines = []
     for part, values in dataclasses.asdict(calibration).items():
         lines += ["", f"[{part}]", *(f"{key} = {value!r}" for key, value in values.items())]
-    made_by = "Travel of one controller's triggers and sticks, as its reports have it. Made by: feelahead calibrate"
+    made_by = (
+        "Travel of one controller's triggers and sticks, as it reports it. Made by: feelahead controller --calibrate"
+    )
     write_controller_file(path, "calibration", address, made_by, lines)

@@ -1,6 +1,6 @@
-"""feelahead-operator or `feelahead feel` on a controller made of two files, for tests of processes.
+"""feelahead-operator or `feelahead controller` on a controller made of two files, for tests of processes.
 
-    python plugged_operator.py FOLDER [feel] [flags of feelahead-operator or feelahead feel]
+    python plugged_operator.py FOLDER [controller] [flags of feelahead-operator or feelahead controller]
 
 FOLDER/hidraw3 is a FIFO that gets the writes to the controller. While FOLDER/plugged exists, the controller is plugged
 in. While FOLDER/broken exists, reads and writes raise an error that no driver should raise.
@@ -13,7 +13,7 @@ from typing import Any
 
 from common.clock import MonotonicClock
 from common.command.launch import launch
-from feelahead.commands.feel.command import feel
+from feelahead.commands.controller.command import controller
 from operator_side.dualsense.hid.device import HidHandle
 from operator_side.main import command
 from tests.helpers.fake_hid import FakeHandle
@@ -71,6 +71,6 @@ class PluggedBackend:
 
 
 if __name__ == "__main__":
-    if sys.argv[1:2] == ["feel"]:
-        launch("feelahead", lambda: lambda arguments: feel(arguments[1:], PluggedBackend()))
+    if sys.argv[1:2] == ["controller"]:
+        launch("feelahead", lambda: lambda arguments: controller(arguments[1:], PluggedBackend()))
     launch("feelahead-operator", lambda: lambda arguments: command(arguments, PluggedBackend()))

@@ -74,7 +74,7 @@ def complaint(command: str) -> str:
         ("feelahead bench coverage --laws swept swept", "--laws swept swept", "each once"),
         ("feelahead bench coverage --only 'no such cell'", "--only no such cell", "wall/bell/200 ms"),
         ("feelahead try demo --site-axis x", "--site-axis x is given without --model", "valid"),
-        ("feelahead feel --trigger l2", "--trigger l2 without --measure", "both"),
+        ("feelahead controller --trigger l2", "--trigger l2 without --measure-forces", "both"),
         ("feelahead-robot --probability nan", "nan", "0 < probability < 1"),
         ("feelahead-robot --link 'delay -5ms'", "-5ms", "0"),
         ("feelahead-robot --bind udp://127.0.0.1:5555", "udp://127.0.0.1:5555", "tcp://HOST:PORT"),
@@ -129,7 +129,7 @@ def test_one_line_names_the_value_and_what_is_valid(
 
 
 def test_an_unset_flag_is_no_choice() -> None:
-    assert "None" not in complaint("feelahead feel --pattern hill")
+    assert "None" not in complaint("feelahead controller --pattern hill")
 
 
 @pytest.mark.processes

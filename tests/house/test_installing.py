@@ -38,7 +38,7 @@ COMMANDS = {
         "feelahead bench --list": "",
         "feelahead try --list": "",
         "feelahead virtual-dualsense --help": "",
-        "feelahead calibrate --device simulated": "",
+        "feelahead controller --calibrate --device simulated": "",
         "feelahead-operator --help": "",
         "feelahead-operator --device simulated --duration 0.5 --status none": "",
         "feelahead-robot": "pip install '.[robot]'",

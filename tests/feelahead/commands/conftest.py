@@ -2,10 +2,12 @@
 
 import contextlib
 from collections.abc import Callable
+from concurrent.futures import Future
 from pathlib import Path
 
 import pytest
 
+from operator_side.controller import search
 from operator_side.controller.state import ControllerState
 from operator_side.dualsense.reports.input_report import build_input_report
 from tests.helpers.fake_hid import FakeBackend, FakeHandle
@@ -33,12 +35,17 @@ class Played:
 @pytest.fixture
 def played(monkeypatch: pytest.MonkeyPatch) -> Played:
     controller = Played()
-    for module in ("feel.command", "calibrate"):
-        monkeypatch.setattr(f"feelahead.commands.{module}.MonotonicClock", lambda: controller)
-    for module in ("feel.loop", "calibrate"):
-        monkeypatch.setattr(f"feelahead.commands.{module}.time.sleep", lambda _: None)
-    monkeypatch.setattr("feelahead.commands.feel.command.ReleaseGuard", contextlib.nullcontext)
+    monkeypatch.setattr("feelahead.commands.controller.command.MonotonicClock", lambda: controller)
+    monkeypatch.setattr(search.BackgroundSearch, "begin", _found_at_once)
+    monkeypatch.setattr("feelahead.commands.controller.loop.time.sleep", lambda _: None)
+    monkeypatch.setattr("feelahead.commands.controller.command.ReleaseGuard", contextlib.nullcontext)
     return controller
+
+
+def _found_at_once(given: search.BackgroundSearch, preferred: str | None) -> None:
+    """Search in this thread, as in another one the time of `Played` would go on meanwhile."""
+    given._look = Future()
+    search._find_for(given._find, preferred, given._look)
 
 
 @pytest.fixture

@@ -99,4 +99,4 @@ def test_a_broken_file_is_named_in_one_line_with_what_mends_it(old: str, new: st
     said = refusal(load_forces, ADDRESS)
     assert named in said
     assert str(path) in said
-    assert "feelahead feel --measure" in said
+    assert "feelahead controller --measure-forces" in said

@@ -64,7 +64,7 @@ def test_a_broken_file_is_named_in_one_line_with_what_mends_it(old: str, new: st
     said = refusal(load_calibration, ADDRESS)
     assert named in said
     assert str(path) in said
-    assert "feelahead calibrate" in said
+    assert "feelahead controller --calibrate" in said
     assert len(said) < 500
 
 

@@ -1,4 +1,4 @@
-"""`feelahead calibrate`, and how the operator side uses the stored result."""
+"""`feelahead controller --calibrate`, and how the operator side uses the stored result."""
 
 import math
 import os
@@ -7,14 +7,14 @@ from pathlib import Path
 
 import pytest
 
-import feelahead.commands.calibrate
 import operator_side.main
 import operator_side.turns
-from common.errors import ConfigurationError, DeviceError, NoDeviceError
+from common.errors import ConfigurationError
 from common.loop import process
+from feelahead.commands.controller.command import controller
 from feelahead.main import command
 from operator_side.calibration.forces import ControllerForces, TriggerForces, forces_path, write_forces
-from operator_side.calibration.procedure import CalibrationError
+from operator_side.calibration.procedure import CalibrationError, Step
 from operator_side.calibration.store import calibration_path, load_calibration, read_calibration, write_calibration
 from operator_side.controller import connection
 from operator_side.controller.feel import RELEASED
@@ -46,9 +46,8 @@ def willing_hands(now_s: float) -> ControllerState:
 
 
 @pytest.fixture
-def willing(played: Played, monkeypatch: pytest.MonkeyPatch) -> Played:
+def willing(played: Played) -> Played:
     played.hands = willing_hands
-    monkeypatch.setattr(feelahead.commands.calibrate, "load_backend", lambda: played.backend)
     return played
 
 
@@ -57,15 +56,15 @@ def test_a_folder_that_cannot_be_made_is_said_before_the_person_begins(
 ) -> None:
     own_folder.write_text("in the way")
     with pytest.raises(ConfigurationError, match="is no folder that this user may write to"):
-        command(["calibrate"])
-    assert (willing.now_s, capsys.readouterr().out) == (0.0, "")
+        controller(["--calibrate"], willing.backend)
+    assert Step.REST.value not in capsys.readouterr().out
     assert willing.handle.closed == willing.handle.times_opened
 
 
 def test_a_real_controller_is_measured_and_kept_by_its_address(
     willing: Played, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert command(["calibrate"]) == 0
+    assert controller(["--calibrate"], willing.backend) == 0
     stored = load_calibration(ADDRESS)
     assert stored is not None
     assert stored.l2.saturation == pytest.approx(0.87, abs=0.01)
@@ -82,27 +81,46 @@ def test_a_real_controller_is_measured_and_kept_by_its_address(
 def test_a_simulated_controller_is_kept_only_where_asked_for(
     tmp_path: Path, own_folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert command(["calibrate", "--device", "simulated"]) == 0
+    assert command(["controller", "--calibrate", "--device", "simulated"]) == 0
     assert "nothing was stored" in capsys.readouterr().out
     assert not own_folder.exists()
     out = tmp_path / "mine.toml"
-    assert command(["calibrate", "--device", "simulated", "--out", str(out)]) == 0
+    assert command(["controller", "--calibrate", "--device", "simulated", "--out", str(out)]) == 0
     _, calibration = read_calibration(out)
     assert calibration.r2 == TriggerTravel(0.03, 0.97)
     assert f"stored: {out}" in capsys.readouterr().out
 
 
-@pytest.mark.parametrize(
-    ("still_s", "error", "said"), [(math.inf, CalibrationError, "Pull L2"), (1.0, DeviceError, "sent nothing for 5 s")]
-)
-def test_hands_that_do_not_pull_or_a_silent_controller_end_it_and_nothing_is_stored(
-    willing: Played, own_folder: Path, still_s: float, error: type[Exception], said: str
-) -> None:
-    willing.hands = lambda now_s: ControllerState() if now_s < still_s else None
-    with pytest.raises(error, match=said):
-        command(["calibrate"])
+def test_hands_that_do_not_pull_end_it_and_nothing_is_stored(willing: Played, own_folder: Path) -> None:
+    willing.hands = lambda _: ControllerState()
+    with pytest.raises(CalibrationError, match="Pull L2"):
+        controller(["--calibrate"], willing.backend)
     assert not own_folder.exists()
     assert willing.handle.closed == willing.handle.times_opened > 0
+
+
+def test_a_controller_that_is_lost_for_long_goes_on_where_it_was(
+    willing: Played, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def hands(now_s: float) -> ControllerState | None:
+        """Return `willing_hands`, silent for 90 s from the middle of the pulls on."""
+        return None if 3.0 <= now_s < 93.0 else willing_hands(now_s if now_s < 3.0 else now_s - 90.0)
+
+    willing.hands = hands
+    assert controller(["--calibrate"], willing.backend) == 0
+    said = capsys.readouterr().out
+    assert "no new report for 0.15 s" in said
+    assert said.count("Pull L2 all the way and let go, three times.") == 1
+    stored = load_calibration(ADDRESS)
+    assert stored is not None
+    assert stored.l2.saturation == pytest.approx(0.87, abs=0.01)
+
+
+def test_ctrl_c_gives_it_up(willing: Played, own_folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    willing.at_turn = lambda: signal.raise_signal(signal.SIGINT) if willing.now_s > 3.0 else None
+    assert controller(["--calibrate"], willing.backend) == 1
+    assert "given up: nothing was stored" in capsys.readouterr().out
+    assert not own_folder.exists()
 
 
 @pytest.mark.parametrize("out", ["new/mine.toml", "."])
@@ -111,18 +129,13 @@ def test_a_place_where_nothing_can_be_written_is_refused_before_anything_is_meas
 ) -> None:
     monkeypatch.chdir(tmp_path)
     with pytest.raises(ConfigurationError, match=f"--out {out}: is a folder, or lies in a folder that does not exist"):
-        command(["calibrate", "--out", out])
+        controller(["--calibrate", "--out", out], willing.backend)
     assert willing.now_s == 0.0
     assert list(tmp_path.iterdir()) == []
 
 
-def test_the_controller_that_was_asked_for_is_measured_or_the_others_are_named(willing: Played) -> None:
-    with pytest.raises(NoDeviceError, match=f"aa:bb:cc:dd:ee:ff is not connected, only: {ADDRESS}"):
-        command(["calibrate", "--controller", "aa:bb:cc:dd:ee:ff"])
-    with pytest.raises(ConfigurationError, match="--controller with --device simulated; valid"):
-        command(["calibrate", "--controller", ADDRESS, "--device", "simulated"])
-    assert load_calibration(ADDRESS) is None
-    assert command(["calibrate", "--controller", ADDRESS]) == 0
+def test_the_controller_that_was_asked_for_is_measured(willing: Played) -> None:
+    assert controller(["--calibrate", "--controller", ADDRESS], willing.backend) == 0
     assert load_calibration(ADDRESS) is not None
     assert willing.handle.closed == willing.handle.times_opened
 
@@ -144,14 +157,14 @@ def test_the_operator_side_uses_what_is_given_else_what_is_stored_for_its_contro
         operator_side.main.command(options, backend)
         return capsys.readouterr().out
 
-    assert "feelahead calibrate" in run()
+    assert "feelahead controller --calibrate" in run()
     assert taken == [TravelCalibration()]
     write_calibration(calibration_path(ADDRESS), ADDRESS, MEASURED)
     assert str(calibration_path(ADDRESS)) in run()
     run("--calibration.l2.saturation", "0.9")
     assert taken[1:] == [MEASURED]
     calibration_path(ADDRESS).write_text("version = 7")
-    with pytest.raises(ConfigurationError, match="feelahead calibrate"):
+    with pytest.raises(ConfigurationError, match="feelahead controller --calibrate"):
         run()
 
 
@@ -177,7 +190,7 @@ def test_the_operator_side_names_a_second_writer_measured_forces_and_the_control
         "aa:bb:cc:dd:ee:ff"
     )
     forces_path(ADDRESS).write_text("version = 7")
-    assert "feelahead feel --measure" in run(ADDRESS)
+    assert "feelahead controller --measure-forces" in run(ADDRESS)
 
 
 def test_a_file_that_breaks_while_it_runs_is_said_and_the_defaults_hold(

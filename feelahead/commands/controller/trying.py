@@ -1,19 +1,20 @@
 """Patterns in the hand, with the zones' strengths and the travel of both triggers on the terminal or as a story."""
 
-from collections.abc import Callable
+import math
 from typing import Final, get_args
 
-from rich.console import Console, Group, RenderableType
-from rich.live import Live
+from rich.console import Group, RenderableType
 from rich.text import Text
 
-from feelahead.commands.feel.patterns import PatternName, Walk
+from feelahead.commands.controller.loop import Screen
+from feelahead.commands.controller.patterns import PatternName, Walk
+from feelahead.commands.virtual_dualsense import pulling
 from operator_side.calibration.forces import ControllerForces, TriggerForces, load_forces
 from operator_side.controller.feel import SENSED_TRAVEL, ZONE_COUNT, Feel, met
 from operator_side.controller.port import OpenController
 from operator_side.controller.state import ControllerState
+from operator_side.dualsense.simulated.controller import SimulatedDualSense
 
-_SHOW_S: Final = 0.05
 _KEYS: Final[dict[str, PatternName]] = {str(n): name for n, name in enumerate(get_args(PatternName), start=1)}
 HELP: Final = f"keys: {'  '.join(f'{key} {name}' for key, name in _KEYS.items())}  space next  q end"
 _PULLED, _LET_GO = 0.2, 0.1
@@ -23,26 +24,19 @@ _BAR: Final = 20
 class Trying:
     """Activity of the loop: walks through patterns, and shows what both triggers do."""
 
-    def __init__(self, walk: Walk, console: Console, *, until: Callable[[float, Walk], bool], keys: bool) -> None:
-        """until: function of the time and the walk that returns whether it ends. keys: whether keys are read."""
-        self._walk, self._console, self._until = walk, console, until
-        self._help = HELP if keys else "simulated, faster than real time; no key is read"
+    def __init__(
+        self, walk: Walk, screen: Screen, simulated: SimulatedDualSense | None, duration_s: float | None
+    ) -> None:
+        """duration_s: None for one round of a simulated controller, and no end of a real one."""
+        self._walk, self._screen, self._simulated = walk, screen, simulated
+        self._duration_s = math.inf if duration_s is None else duration_s
+        self._rounds = 1 if simulated is not None and duration_s is None else math.inf
         self._forces = ControllerForces()
-        self._live = Live(console=console, auto_refresh=False) if console.is_terminal else None
-        self._shown_s, self._start_s = -1.0, 0.0
+        self._start_s = 0.0
         self._state: ControllerState | None = None
         self._said: str | None = None
         self._peaks = {"L2": (0.0, ""), "R2": (0.0, "")}
         """Largest travel of each pull, and what was met there"""
-
-    def __enter__(self) -> "Trying":
-        if self._live is not None:
-            self._live.start()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        if self._live is not None:
-            self._live.stop()
 
     @property
     def feel(self) -> Feel:
@@ -55,6 +49,8 @@ class Trying:
 
     def turn(self, state: ControllerState | None, typed: str | None, now_s: float) -> bool:
         """Follow the keys and the time, and show the state."""
+        if self._simulated is not None:
+            self._simulated.set_finger_force(*pulling(now_s)[:2])
         if self._state is None:  # the walk begins with the controller
             self._start_s = now_s
             self._state = state
@@ -67,33 +63,31 @@ class Trying:
             elif key in _KEYS:
                 self._walk.choose(_KEYS[key])
         self._walk.advance(now_s)
-        if self._until(now_s - self._start_s, self._walk):
+        if now_s - self._start_s >= self._duration_s or self._walk.rounds >= self._rounds:
             return False
         if state is not None:
             self._state = state
-            if self._live is None:
+            if not self._screen.draws:
                 self._tell(state, now_s - self._start_s)
-            elif now_s >= self._shown_s + _SHOW_S:
-                self._shown_s = now_s
-                self._live.update(self._drawing(state), refresh=True)
+            self._screen.draw(lambda: self._drawing(state), now_s)
         return True
 
-    def note(self, text: str) -> None:
-        """Print a line above the drawing."""
-        self._console.print(text, markup=False, highlight=False, soft_wrap=not self._console.is_terminal)
+    def finish(self) -> list[str]:
+        """Return no result."""
+        return []
 
     def _tell(self, state: ControllerState, now_s: float) -> None:
         stage = self._walk.stage
         if (said := f"{self._headline()}: {' '.join(map(str, stage.strengths))}") != self._said:
             self._said = said
-            self.note(f"{now_s:7.1f} s  {said}")
+            self._screen.say(f"{now_s:7.1f} s  {said}")
         for name, travel in (("L2", state.l2), ("R2", state.r2)):
             here = (travel, f"zone {_zone(travel)}, strength {met(stage.strengths, travel)}")
             peak = self._peaks[name] = max(self._peaks[name], here)
             if travel < _LET_GO:
                 self._peaks[name] = here
                 if peak[0] > _PULLED:
-                    self.note(f"{now_s:7.1f} s  {name} was pulled to {peak[0]:.2f}: {peak[1]}")
+                    self._screen.say(f"{now_s:7.1f} s  {name} was pulled to {peak[0]:.2f}: {peak[1]}")
 
     def _headline(self) -> str:
         stage = self._walk.stage
@@ -116,7 +110,8 @@ class Trying:
                 f"   pulled {'█' * filled}{'·' * (_BAR - filled)} {travel:.2f}, meets {met(strengths, travel)}"
             )
             lines.append(zones)
-        return Group(*lines, Text(self._help, style="dim"))
+        words = HELP if self._simulated is None else "simulated, faster than real time; no key is read"
+        return Group(*lines, Text(words, style="dim"))
 
 
 def _newtons(forces: TriggerForces, strength: int) -> str:

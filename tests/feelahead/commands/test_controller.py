@@ -1,4 +1,4 @@
-"""`feelahead feel`: patterns in the hand, and the measurement of forces, with a simulated or a played controller."""
+"""`feelahead controller`: patterns in the hand, and forces, with a simulated or a played controller."""
 
 import contextlib
 import os
@@ -11,11 +11,11 @@ from pathlib import Path
 
 import pytest
 
-import feelahead.commands.feel.command
+import feelahead.commands.controller.command
 from common.errors import ConfigurationError
-from feelahead.commands.feel.command import feel
-from feelahead.commands.feel.loop import typing
-from feelahead.commands.feel.patterns import STAGES, Stage, Walk
+from feelahead.commands.controller.command import controller
+from feelahead.commands.controller.loop import typing
+from feelahead.commands.controller.patterns import STAGES, Stage, Walk
 from feelahead.main import command
 from operator_side.calibration.force_measurement import ForceMeasurement
 from operator_side.calibration.forces import ControllerForces, TriggerForces, forces_path, load_forces, write_forces
@@ -50,14 +50,14 @@ def test_the_patterns_are_walked_through_and_a_key_stays_in_one() -> None:
 
 
 def test_a_story_tells_what_is_written_and_where_a_pull_met_it(capsys: pytest.CaptureFixture[str]) -> None:
-    assert command(["feel", "--device", "simulated"]) == 0
+    assert command(["controller", "--device", "simulated"]) == 0
     said = capsys.readouterr().out
     for stage in STAGES:
         assert f"{stage.words}: {' '.join(map(str, stage.strengths))}\n" in said
     # 3.7 N pass a free trigger, and stand where the wall begins.
     assert "R2 was pulled to 1.00: zone 7, strength 0\n" in said
     assert "R2 was pulled to 0.53: zone 4, strength 8\n" in said
-    assert command(["feel", "--device", "simulated", "--pattern", "wall", "--duration", "9"]) == 0
+    assert command(["controller", "--device", "simulated", "--pattern", "wall", "--duration", "9"]) == 0
     said = capsys.readouterr().out
     assert "a wall at the middle" in said
     assert "free" not in said
@@ -65,29 +65,31 @@ def test_a_story_tells_what_is_written_and_where_a_pull_met_it(capsys: pytest.Ca
 
 def test_measured_forces_are_shown_beside_the_strengths(capsys: pytest.CaptureFixture[str]) -> None:
     write_forces(forces_path(SIMULATED_ADDRESS), SIMULATED_ADDRESS, ControllerForces(r2=FORCES))
-    assert command(["feel", "--device", "simulated"]) == 0
+    assert command(["controller", "--device", "simulated"]) == 0
     assert "strength 5 of 8 everywhere (R2 2.0 +1.5 N): 5 5" in capsys.readouterr().out
     forces_path(SIMULATED_ADDRESS).write_text("version = 7")
-    with pytest.raises(ConfigurationError, match="feelahead feel --measure"):
-        command(["feel", "--device", "simulated"])
+    with pytest.raises(ConfigurationError, match="feelahead controller --measure-forces"):
+        command(["controller", "--device", "simulated"])
 
 
 def test_a_simulated_measurement_is_stored_only_where_asked_for(
     tmp_path: Path, own_folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert command(["feel", "--measure", "--device", "simulated"]) == 0
+    assert command(["controller", "--measure-forces", "--device", "simulated"]) == 0
     said = capsys.readouterr().out
     assert "strengths 1 to 8 add 0.3 0.5 0.8 1.0 1.3 1.5 1.8 2.0 N" in said
     assert "--strongest-effect 2.0" in said
     assert "nothing was stored" in said
     assert not own_folder.exists()
-    assert command(["feel", "--measure", "--device", "simulated", "--out", str(tmp_path / "mine.toml")]) == 0
+    assert (
+        command(["controller", "--measure-forces", "--device", "simulated", "--out", str(tmp_path / "mine.toml")]) == 0
+    )
     assert "[r2]" in (tmp_path / "mine.toml").read_text()
 
 
 def test_a_named_file_keeps_the_other_trigger_and_whatever_is_no_forces(tmp_path: Path) -> None:
     path = tmp_path / "mine.toml"
-    measure = ["feel", "--measure", "--device", "simulated", "--out", str(path)]
+    measure = ["controller", "--measure-forces", "--device", "simulated", "--out", str(path)]
     for trigger in ("r2", "l2"):
         assert command([*measure, "--trigger", trigger]) == 0
     assert {"[l2]", "[r2]"} <= set(path.read_text().splitlines())
@@ -102,14 +104,24 @@ def test_a_named_file_keeps_the_other_trigger_and_whatever_is_no_forces(tmp_path
     [
         (["--controller", "mine"], "--controller = 'mine'; valid: six pairs"),
         (["--controller", ADDRESS, "--device", "simulated"], "--controller with --device simulated; valid"),
-        (["--measure", "--pattern", "wall"], "--measure excludes --pattern"),
-        (["--out", "mine.toml"], "--out without --measure; valid: both"),
+        (["--measure-forces", "--pattern", "wall"], "--measure-forces excludes --pattern"),
+        (["--calibrate", "--duration", "3"], "--calibrate excludes --pattern and --duration"),
+        (["--calibrate", "--measure-forces"], "exclude each other; valid: one after the other"),
+        (["--out", "mine.toml"], "--out without --calibrate or --measure-forces; valid: with one of them"),
         (["--duration", "0"], "--duration"),
     ],
 )
 def test_what_makes_no_sense_is_refused(flags: list[str], said: str) -> None:
     with pytest.raises(ConfigurationError, match=said):
-        command(["feel", *flags])
+        command(["controller", *flags])
+
+
+@pytest.mark.parametrize(
+    ("former", "now"), [("calibrate", "controller --calibrate"), ("feel", "controller .with --measure-forces")]
+)
+def test_a_former_name_says_the_present_one(former: str, now: str) -> None:
+    with pytest.raises(ConfigurationError, match=f"{former} is part of another command now: feelahead {now}"):
+        command([former, "--device", "simulated"])
 
 
 def test_keys_are_taken_one_by_one_and_the_terminal_is_as_before(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -143,9 +155,9 @@ def test_a_wall_is_written_and_taken_back_however_it_ends(played: Played, way: s
     flags = ["--pattern", "wall", *(["--duration", "100"] if way == "duration" else [])]
     if way == "error":
         with pytest.raises(RuntimeError):
-            feel(flags, played.backend)
+            controller(flags, played.backend)
     else:
-        assert feel(flags, played.backend) == 0
+        assert controller(flags, played.backend) == 0
     wall, released = map(parse_output_report, played.handle.written)
     assert wall.l2 == wall.r2 == (0, 0, 0, 0, *(6 * (MAX_STRENGTH,)))
     assert released == RELEASED
@@ -157,7 +169,7 @@ def test_it_waits_for_the_controller_that_was_asked_for_and_names_the_others(
 ) -> None:
     # Each look opens and closes it twice; the note of the first two was shown before the third.
     played.at_turn = lambda: signal.raise_signal(signal.SIGINT) if played.handle.closed >= 6 else None
-    assert feel(["--controller", "aa:bb:cc:dd:ee:ff"], played.backend) == 0
+    assert controller(["--controller", "aa:bb:cc:dd:ee:ff"], played.backend) == 0
     assert f"aa:bb:cc:dd:ee:ff is not connected, only: {ADDRESS}; waiting for a controller" in capsys.readouterr().out
     assert played.handle.written == []
 
@@ -172,9 +184,9 @@ def test_a_measurement_is_stored_for_the_controller_beside_the_other_triggers(
     def lines() -> str:
         return f"{200 + 30 * measured.strength}\n" if measured.yielded else ""
 
-    monkeypatch.setattr(feelahead.commands.feel.command, "ForceMeasurement", lambda _: measured)
-    monkeypatch.setattr(feelahead.commands.feel.command, "typing", lambda **_: contextlib.nullcontext(lines))
-    assert feel(["--measure"], played.backend) == 0
+    monkeypatch.setattr(feelahead.commands.controller.command, "ForceMeasurement", lambda _: measured)
+    monkeypatch.setattr(feelahead.commands.controller.command, "typing", lambda **_: contextlib.nullcontext(lines))
+    assert controller(["--measure-forces"], played.backend) == 0
     forces = load_forces(ADDRESS)
     assert forces.l2 == FORCES
     assert forces.r2 is not None
@@ -186,8 +198,10 @@ def test_a_measurement_is_stored_for_the_controller_beside_the_other_triggers(
 def test_a_measurement_that_is_given_up_stores_nothing(
     played: Played, own_folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(feelahead.commands.feel.command, "typing", lambda **_: contextlib.nullcontext(lambda: None))
-    assert feel(["--measure"], played.backend) == 1
+    monkeypatch.setattr(
+        feelahead.commands.controller.command, "typing", lambda **_: contextlib.nullcontext(lambda: None)
+    )
+    assert controller(["--measure-forces"], played.backend) == 1
     assert "given up: nothing was stored" in capsys.readouterr().out
     assert not own_folder.exists()
 
@@ -197,14 +211,14 @@ def test_what_cannot_be_stored_is_said_before_the_first_press(
     played: Played, own_folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], fault: str
 ) -> None:
     typed = contextlib.nullcontext(lambda: "" if played.now_s < 10.0 else None)
-    monkeypatch.setattr(feelahead.commands.feel.command, "typing", lambda **_: typed)
+    monkeypatch.setattr(feelahead.commands.controller.command, "typing", lambda **_: typed)
     if fault == "folder":
         own_folder.write_text("in the way")
     else:
         forces_path(ADDRESS).parent.mkdir(parents=True)
         forces_path(ADDRESS).write_text("version = 7")
     with pytest.raises(ConfigurationError, match=str(own_folder)):
-        feel(["--measure"], played.backend)
+        controller(["--measure-forces"], played.backend)
     assert "press" not in capsys.readouterr().out
     assert played.handle.closed == played.handle.times_opened
 
@@ -216,7 +230,7 @@ def test_the_triggers_are_released_when_its_process_is_killed(tmp_path: Path) ->
     controller = os.open(tmp_path / "hidraw3", os.O_RDWR)
     program = [sys.executable, str(ROOT / "tests/helpers/plugged_operator.py"), str(tmp_path)]
     with subprocess.Popen(
-        [*program, "feel", "--pattern", "wall"],
+        [*program, "controller", "--pattern", "wall"],
         stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE,
         env={**os.environ, "PYTHONPATH": str(ROOT)},

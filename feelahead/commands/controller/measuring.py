@@ -1,14 +1,24 @@
 """Guide through the measurement of a trigger's forces with a kitchen scale."""
 
-from collections.abc import Callable
+import dataclasses
 from typing import Final
 
-from common.errors import ConfigurationError
+from feelahead.commands.controller.keeping import Keeping
+from feelahead.commands.controller.loop import Screen
 from operator_side.calibration.force_measurement import BACK, ForceMeasurement
-from operator_side.calibration.forces import STRENGTHS, TriggerForces, forces_in_words
+from operator_side.calibration.forces import (
+    STRENGTHS,
+    ControllerForces,
+    TriggerForces,
+    forces_in_words,
+    stored_forces,
+    write_forces,
+)
 from operator_side.controller.feel import Feel
 from operator_side.controller.port import OpenController
 from operator_side.controller.state import ControllerState
+from operator_side.dualsense.simulated.controller import SimulatedDualSense
+from operator_side.people.measuring_hands import MeasuringHands
 from operator_side.people.settings import PersonSettings
 
 _GUIDE: Final = (
@@ -23,17 +33,12 @@ class Measuring:
     """Activity of the loop: tells what to do, and takes typed grams, until all strengths are measured."""
 
     def __init__(
-        self,
-        measurement: ForceMeasurement,
-        say: Callable[[str], None],
-        prepare: Callable[[str], None] = lambda _: None,
+        self, measurement: ForceMeasurement, keeping: Keeping, screen: Screen, simulated: SimulatedDualSense | None
     ) -> None:
-        """prepare: called once, before the first press, with the controller's address."""
-        self.address: str | None = None
-        """Address of the measured controller; None before it is found."""
-        self._measurement, self._say, self._prepare = measurement, say, prepare
+        self._measurement, self._keeping, self._screen = measurement, keeping, screen
+        self._hands = None if simulated is None else MeasuringHands(simulated)
+        self._known = ControllerForces()
         self._line = self._told = ""
-        self.note = say
 
     @property
     def feel(self) -> Feel:
@@ -41,35 +46,39 @@ class Measuring:
         return self._measurement.feel
 
     def found(self, controller: OpenController) -> None:
-        """Take the controller to be measured; ConfigurationError for one without an address, or another one."""
-        if controller.address is None:
-            raise ConfigurationError(f"{controller.name} does not tell its address; valid: a controller that does")
-        if self.address not in (None, controller.address):
-            raise ConfigurationError(f"another controller, {controller.address}; valid: the same, {self.address}")
-        if self.address is None:
-            self._prepare(controller.address)
-            self._say(_GUIDE.format(trigger=self._measurement.trigger.upper()))
-        self.address = controller.address
+        """Take the controller, and load what is stored for it."""
+        if self._keeping.begin(controller):
+            if self._keeping.path is not None and controller.address is not None:
+                self._known = stored_forces(self._keeping.path, controller.address)
+            self._screen.say(_GUIDE.format(trigger=self._measurement.trigger.upper()))
 
     def turn(self, state: ControllerState | None, typed: str | None, now_s: float) -> bool:
         """Feed the measurement, and tell what to do next; False at its end, or once nothing more can be typed."""
-        del now_s
-        if typed is None:
-            return False
-        if self.address is None:
-            return True
+        measurement = self._measurement
+        if state is not None:
+            measurement.feed(state)
+        if self._hands is not None:
+            typed = self._hands.act(measurement, now_s)
+        if typed is None or self._keeping.address is None:
+            return typed is not None
         *lines, self._line = (self._line + typed).split("\n")
         for line in filter(str.strip, lines):
-            if self._measurement.result is None and (complaint := self._measurement.enter(line)) is not None:
-                self._say(complaint)
-        if state is not None:
-            self._measurement.feed(state)
-        if self._measurement.result is not None:
-            return False
-        if (instruction := self._measurement.instruction) != self._told:
-            self._told = instruction
-            self._say(instruction)
-        return True
+            if measurement.result is None and (complaint := measurement.enter(line)) is not None:
+                self._screen.say(complaint)
+        if measurement.result is None and measurement.instruction != self._told:
+            self._told = measurement.instruction
+            self._screen.say(self._told)
+        return measurement.result is None
+
+    def finish(self) -> list[str] | None:
+        """Store the forces beside the other trigger's; return what they say."""
+        if (result := self._measurement.result) is None or self._keeping.address is None:
+            return None
+        trigger = self._measurement.trigger
+        if self._keeping.path is not None:
+            forces = dataclasses.replace(self._known, **{trigger: result})
+            write_forces(self._keeping.path, self._keeping.address, forces)
+        return [*result_lines(trigger.upper(), result), self._keeping.stored()]
 
 
 def result_lines(name: str, forces: TriggerForces) -> list[str]:
