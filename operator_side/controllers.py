@@ -20,6 +20,7 @@ from operator_side.dualsense.hid.finding import Finder
 from operator_side.dualsense.hid.release_guard import ReleaseGuard
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.evdev.pad import find_pad
+from operator_side.people.arming_hands import constant_force
 from operator_side.people.simulated_hands import simulated_hands
 from operator_side.settings import OperatorSettings
 from operator_side.viewing.pages.browser_hands import BrowserHands
@@ -74,11 +75,12 @@ def _evdev(given: OpeningParts) -> Opening:
 def _simulated(given: OpeningParts) -> Opening:
     settings, device, core = given.settings, SimulatedDualSense(), given.core
     calibration, swap_sides = settings.calibration, settings.swap_sides
+    own = settings.person_file if settings.pull_n is None else constant_force(settings.pull_n)
     person = functools.partial(
         simulated_hands,
         *(device, settings.person, settings.seed, calibration),
         swap_sides=swap_sides,
-        own=settings.person_file,
+        own=own,
     )
     shared = SharedHands(given.pages, core.calibrate, device, calibration, person, swap_sides=swap_sides)
     return Opening(Ready(OpenController(shared, "simulated DualSense")), hands=shared)

@@ -67,8 +67,8 @@ class OperatorSettings(SideOptions):
     swap_sides: bool = False
     """Swap left and right: L2 advances, R2 retreats, R1 is held to run, the right stick moves across, the left stick
     turns."""
-    calibration: TravelCalibration = field(default_factory=TravelCalibration)
-    """Calibration of triggers and sticks: dead zones, saturation and rest positions."""
+    calibration: Annotated[TravelCalibration, tyro.conf.Suppress] = field(default_factory=TravelCalibration)
+    """Only in a TOML file: calibration of triggers and sticks, their dead zones, saturation and rest positions."""
     rendering: RenderingSettings = field(default_factory=RenderingSettings)
     """Rendering of onset distances as stiffness."""
     console: bool = False
@@ -80,10 +80,13 @@ class OperatorSettings(SideOptions):
     open. Pages then offer to run again, and --status json has an event for it."""
     tui: bool = False
     """Show the console's facts on the whole terminal instead of one line, for machines without a browser."""
-    person: PersonSettings = field(default_factory=PersonSettings)
-    """Abilities and errors of the scripted person (only with --device simulated)."""
+    person: Annotated[PersonSettings, tyro.conf.Suppress] = field(default_factory=PersonSettings)
+    """Only in a TOML file: abilities and errors of the scripted person (only with --device simulated)."""
     person_file: Annotated[Path | None, tyro.conf.arg(metavar="FILE.py")] = None
     """A person of your own instead of the scripted one (only with --device simulated; docs/python.md)."""
+    pull_n: Annotated[Annotated[float, Meta(ge=0.0, le=20.0)] | None, tyro.conf.arg(metavar="NEWTONS")] = None
+    """Instead of the scripted person, arm the robot and then pull R2 with this force until the end (only with --device
+    simulated). 2 N is a light pull, 3.7 N a normal one."""
     person_waits: Annotated[float, Meta(ge=0.0, le=3600.0), tyro.conf.arg(metavar="SECONDS")] = 0.0
     """Longest time, in seconds, that the scripted person waits for the first picture on a page of the console, counted
     from the robot side's first telemetry."""
@@ -101,10 +104,9 @@ class OperatorSettings(SideOptions):
             raise ValueError(
                 "--robot-key is given without --keys; valid: both (`feelahead keys make operator` makes our key)"
             )
-        if self.swap_sides and self.person.pull_n is not None:
-            raise ValueError(
-                "--swap-sides and --person.pull-n exclude each other, as the finger pulls R2; valid: only one of them"
-            )
+        if self.pull_n is not None and (self.swap_sides or self.person_file is not None):
+            other = "--swap-sides" if self.swap_sides else "--person-file"
+            raise ValueError(f"{other} and --pull-n exclude each other, as a finger pulls R2; valid: only one of them")
 
     @property
     def tells_facts(self) -> bool:

@@ -35,10 +35,12 @@ def parse_settings(
     """Make the dataclass `settings_type` from its defaults, then `--config FILE.toml`, then the flags.
 
     Every field of the (nested) dataclass is a key of the file and a flag: `[camera] mean_m = 0.001` and
-    `--camera.mean-m 0.001`. `elsewhere` is appended to the error about an unknown key of the file. Raises
-    ConfigurationError for unknown, malformed or out-of-range values; SystemExit after `--help`.
+    `--camera.mean-m 0.001`. A field with `tyro.conf.Suppress` is only a key. `elsewhere` is appended to the error about
+    an unknown key of the file. Raises ConfigurationError for unknown, malformed or out-of-range values; SystemExit
+    after `--help`.
     """
     path = _config_path(arguments)
+    _refuse_keys_as_flags(settings_type, arguments)
     try:
         default = settings_type() if path is None else load_toml(Path(path), settings_type, elsewhere)
     except ValueError as error:
@@ -142,6 +144,17 @@ def _config_path(arguments: Sequence[str]) -> str | None:
     if (path := value_of("--config", arguments)) == "":
         raise ConfigurationError("--config: no file given; valid: the path of a TOML file")
     return path
+
+
+def _refuse_keys_as_flags(settings_type: type, arguments: Sequence[str]) -> None:
+    hints = get_type_hints(settings_type, include_extras=True)
+    keys = {name for name, hint in hints.items() if tyro.conf.Suppress in getattr(hint, "__metadata__", ())}
+    for flag in (argument.partition("=")[0] for argument in arguments if argument.startswith("--")):
+        key = flag.removeprefix("--").replace("-", "_")
+        if key.partition(".")[0] in keys:
+            raise ConfigurationError(
+                f"{_shortened(flag)}: is no flag; valid: {_shortened(key)} in the file of --config"
+            )
 
 
 def _refuse_unknown_keys(

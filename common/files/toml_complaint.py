@@ -25,7 +25,8 @@ def explain(complaint: str, content: Mapping[str, Any], settings_type: type) -> 
     value: Any = content
     hint: Any = settings_type
     for key in keys:
-        value, hint = value[key], get_type_hints(hint, include_extras=True)[key]
+        settings = get_args(hint)[0] if get_origin(hint) is Annotated else hint
+        value, hint = value[key], get_type_hints(settings, include_extras=True)[key]
     if not said.startswith(("Expected", "Invalid enum value")):
         # A dataclass's error about its fields, which names what is valid.
         return f"{'.'.join(keys)}: {said}"

@@ -30,7 +30,7 @@ class Trial:
     def operator_arguments(self) -> list[str]:
         """Return the operator side's flags, without those for link and address."""
         haptics = "--haptics" if self.haptics else "--no-haptics"
-        return ["--device=simulated", haptics, f"--seed={self.seed}", f"--person.pull-n={self.force_n}"]
+        return ["--device=simulated", haptics, f"--seed={self.seed}", f"--pull-n={self.force_n}"]
 
     def link_arguments(self) -> list[str]:
         """Return the flags with which a side emulates the link."""

@@ -51,6 +51,3 @@ class PersonSettings(Limited):
     marks: bool = False
     """Whether the person marks the run as an episode: start once armed, then success, or failure if the object was
     dropped or never grasped."""
-    pull_n: Annotated[float, Meta(ge=0.0, le=20.0)] | None = None
-    """Force on R2, in N. If given, the person only arms the robot and then pulls R2 with this force until the end. 2 N
-    is a light pull, 3.7 N a normal one."""

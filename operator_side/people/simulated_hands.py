@@ -1,11 +1,11 @@
-"""Choice of the scripted person at the simulated controller: one who does a whole task, or one who only pulls."""
+"""Choice of the scripted person at the simulated controller: one who does a whole task, or one of somebody else."""
 
 from pathlib import Path
 
 from common.files.plugged import find, require_methods
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.hands.travel_calibration import TravelCalibration
-from operator_side.people.arming_hands import ArmingHands, constant_force
+from operator_side.people.arming_hands import ArmingHands
 from operator_side.people.person import SimulatedOperator
 from operator_side.people.port import Person
 from operator_side.people.settings import PersonSettings
@@ -28,8 +28,6 @@ def simulated_hands(
     """
     if own is not None:
         return ArmingHands(device, own_person(own))
-    if settings.pull_n is not None:
-        return ArmingHands(device, constant_force(settings.pull_n))
     return SimulatedOperator(device, settings, seed, calibration, swap_sides=swap_sides)
 
 

@@ -278,7 +278,7 @@ def run_once(one: Browser, delay_ms: float, seed: int, given: Sequence[str]) -> 
     """Start a demo with this delay each way, this seed and the `given` flags; drive it, and return its row."""
     with tempfile.TemporaryDirectory(prefix="feelahead-") as folder:
         summary, idle = Path(folder) / "summary.json", Path(folder) / "idle.toml"
-        idle.write_text("[person]\npull_n = 0.0\n")  # the scripted person does nothing
+        idle.write_text("pull_n = 0.0\n")  # the scripted person does nothing
         link = ("--link", f"delay {delay_ms:g}ms") if delay_ms else ()
         with (
             running(

@@ -99,10 +99,12 @@ def complaint(command: str) -> str:
         ("feelahead-operator --connect tcp://127.0.0.1:99999", "99999", "65535"),
         ("feelahead-operator --keys missing", "missing", "feelahead keys make operator --folder missing"),
         (f"feelahead-operator --robot-key {KEY}", "--robot-key is given without --keys", "both"),
-        ("feelahead-operator --person.grasp-depth-m=-1", "--person.grasp-depth-m = -1", "0"),
-        ("feelahead-operator --calibration.left-stick.dead-zone=1", "dead_zone = 1", "below 1"),
+        ("feelahead-operator --person.grasp-depth-m=-1", "--person.grasp-depth-m", "person.grasp_depth_m in the file"),
+        ("feelahead-operator --calibration.left-stick.dead-zone=1", "left-stick.dead-zone", "in the file of --config"),
+        ("feelahead-operator --config {person}", "person.grasp_depth_m", "at least 0"),
+        ("feelahead-operator --config {calibration}", "dead_zone = 1", "below 1"),
         ("feelahead-operator --rendering.horizon-s=3", "--rendering.horizon-s = 3", "2"),
-        ("feelahead-operator --swap-sides --person.pull-n=3", "--swap-sides and --person", "valid"),
+        ("feelahead-operator --swap-sides --pull-n=3", "--swap-sides and --pull-n", "valid"),
         ("feelahead-operator --tui --status=json", "--tui and --status json", "one of them"),
         ("feelahead-operator --asymmetry=-11s", "-11s", "10s"),
         ("feelahead-operator --tick-period 4", "--tick-period: '4'", "50ms"),
@@ -115,11 +117,15 @@ def test_one_line_names_the_value_and_what_is_valid(
 ) -> None:
     folder = tmp_path_factory.mktemp("bad")
     (folder / "some.toml").write_text("[camera]\nsd_mm = 3")
+    (folder / "person.toml").write_text("[person]\ngrasp_depth_m = -1")
+    (folder / "calibration.toml").write_text("[calibration.left_stick]\ndead_zone = 1")
     (folder / "none.toml").write_text("probability = = 1")
     with socket.create_server(("127.0.0.1", 0)) as taken:
         given = {
             "folder": folder,
             "toml": folder / "some.toml",
+            "person": folder / "person.toml",
+            "calibration": folder / "calibration.toml",
             "no_toml": folder / "none.toml",
             "port": taken.getsockname()[1],
         }

@@ -70,16 +70,12 @@ class DemoSettings(Sweep):
     """Maximum duration of each run, in virtual time."""
     tick_period: TickPeriod = TURN
     """Period of both sides' turns, 1ms to 20ms."""
-    person: PersonSettings = field(default_factory=PersonSettings)
+    person: Annotated[PersonSettings, tyro.conf.Suppress] = field(default_factory=PersonSettings)
 
     def __post_init__(self) -> None:
         super().__post_init__()
         require_law(self.law)
         tick_period_s(self.tick_period)
-        if self.person.pull_n is not None:
-            raise ValueError(
-                f"--person.pull-n {self.person.pull_n}: a finger that only pulls cannot do the task; valid: without it"
-            )
         if not self.link:
             raise ValueError("--link: no value is given; valid: one value or more")
         for spec in self.link:

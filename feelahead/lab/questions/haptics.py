@@ -63,15 +63,11 @@ class HapticsSettings(Sweep):
     """datagram: messages may be lost and reordered. stream: messages stay in order and losses delay them."""
     duration: Annotated[float, Meta(gt=0.0, lt=1e4), tyro.conf.arg(metavar="SECONDS")] = 45.0
     """Maximum duration of each trial, in virtual time."""
-    person: PersonSettings = field(default_factory=lambda: MISJUDGES_DEPTH)
+    person: Annotated[PersonSettings, tyro.conf.Suppress] = field(default_factory=lambda: MISJUDGES_DEPTH)
 
     def __post_init__(self) -> None:
         super().__post_init__()
         require_tried(self.law, "law", tuple(LAWS))
-        if self.person.pull_n is not None:
-            raise ValueError(
-                f"--person.pull-n {self.person.pull_n}: a finger that only pulls cannot do the task; valid: without it"
-            )
         for name in ("scenes", "delays"):
             values = getattr(self, name)
             if not values or len(set(values)) < len(values):

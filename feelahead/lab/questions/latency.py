@@ -23,7 +23,7 @@ from common.emulation.clauses import LinkModel
 from common.emulation.named_links import NAMED_LINKS
 from common.errors import FeelaheadError
 from common.status.codes import LinkState
-from feelahead.both_sides.episode import GRASPING, Episode
+from feelahead.both_sides.episode import Episode
 from feelahead.both_sides.real_time import LINK_S, run_for, started
 from feelahead.both_sides.summary import merge_summaries
 from feelahead.both_sides.trial import Trial, figures_of
@@ -34,6 +34,7 @@ from feelahead.lab.intervals import student_interval, welch_interval
 from feelahead.lab.sweep import Question, Sweep
 from feelahead.lab.table import Row, Table
 from feelahead.printing.figures import shown
+from operator_side.people.arming_hands import constant_force
 from operator_side.settings import OperatorSettings
 from robot_side.settings import RobotSettings
 
@@ -114,7 +115,7 @@ def in_virtual_time(trial: Trial) -> Row:
     link = trial.link_arguments()
     robot = parse_settings(RobotSettings, "feelahead-robot", [*trial.robot_arguments(), *link])
     operator = parse_settings(OperatorSettings, "feelahead-operator", [*trial.operator_arguments(), *link])
-    both = Episode(robot=robot, operator=operator, person=GRASPING, sampled=False).loop
+    both = Episode(robot=robot, operator=operator, person=constant_force(trial.force_n), sampled=False).loop
     while both.operator.status(both.clock.now()).link is not LinkState.UP:
         if both.clock.now() > LINK_S:
             raise FeelaheadError(f"no link within {LINK_S:g} s over --link {trial.link!r}")

@@ -16,9 +16,9 @@ from feelahead.both_sides.episode import Episode as Both
 from feelahead.both_sides.loopback import Loopback
 from feelahead.lab.approaches.approach import Approach, PullRun
 from operator_side.controller.feel import USUAL_LIGHT, WARNING_LIGHT
+from operator_side.people.arming_hands import constant_force
 from operator_side.people.person import SimulatedOperator
 from operator_side.people.port import FingerInput, Pulling
-from operator_side.people.settings import PersonSettings
 from tests.helpers.repository import DATA
 
 pytestmark = pytest.mark.long
@@ -224,8 +224,7 @@ def test_a_hand_that_pulls_on_through_it_moves_nothing_before_it_has_let_go() ->
 def test_the_summary_tells_how_fast_a_constant_finger_hits_the_wall(
     haptics: bool, slowest_mm_s: float, fastest_mm_s: float
 ) -> None:
-    person = PersonSettings(pull_n=3.0)
-    run = Both(scene="wall", haptics=haptics, person=person, sampled=False).step(4.0)
+    run = Both(scene="wall", haptics=haptics, person=constant_force(3.0), sampled=False).step(4.0)
     first = run.summary()["first_contact"]
     assert first["with"] == "wall"
     assert slowest_mm_s < first["speed_mm_s"] < fastest_mm_s

@@ -144,7 +144,7 @@ def test_the_controller_that_was_asked_for_is_measured(willing: Played) -> None:
 
 
 def test_the_operator_side_uses_what_is_given_else_what_is_stored_for_its_controller(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     backend = FakeBackend({0x0CE6: {b"/dev/hidraw3": FakeHandle()}})
     # The priority would be this process's, and stay so.
@@ -161,7 +161,9 @@ def test_the_operator_side_uses_what_is_given_else_what_is_stored_for_its_contro
     assert taken == [TravelCalibration()]
     write_calibration(calibration_path(ADDRESS), ADDRESS, MEASURED)
     assert str(calibration_path(ADDRESS)) in run()
-    run("--calibration.l2.saturation", "0.9")
+    given = tmp_path / "given.toml"
+    given.write_text("[calibration.l2]\nsaturation = 0.9")
+    run("--config", str(given))
     assert taken[1:] == [MEASURED]
     calibration_path(ADDRESS).write_text("version = 7")
     with pytest.raises(ConfigurationError, match="feelahead controller --calibrate"):
