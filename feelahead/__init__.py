@@ -4,7 +4,9 @@ These names are for scripts; docs/python.md shows them at work. Each is imported
 needs only what it uses.
 """
 
+import sys
 from importlib import import_module
+from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any, Final
 
 if TYPE_CHECKING:
@@ -56,6 +58,24 @@ __all__ = [  # made by __getattr__
     "enlargement_distance",
     "overlaps",
 ]
+
+
+def _require_own_common() -> None:
+    """Raise ImportError if Python finds something else of the name `common` before feelahead's own package."""
+    try:
+        found = find_spec("common.errors") is not None
+    except ModuleNotFoundError:
+        found = False
+    if not found:
+        first = sys.modules.get("common")
+        where = getattr(first, "__file__", None) or "nowhere"
+        raise ImportError(
+            f"feelahead's package `common` is hidden by {where}; valid: another name for your own file or folder, or"
+            " feelahead installed as a wheel (pip install .), which shares the folder with other packages"
+        )
+
+
+_require_own_common()
 
 
 def __getattr__(name: str) -> Any:
