@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any, Final
 if TYPE_CHECKING:
     from common.link_model import DelayLine, LinkProfile
     from feelahead.both_sides.episode import Episode
-    from feelahead.both_sides.history import Contact, History
     from operator_side.controller.port import Controller
     from operator_side.people.port import FingerInput, Person, Seen
     from robot_side import overlap as overlaps
@@ -21,21 +20,23 @@ if TYPE_CHECKING:
     from robot_side.laws.inputs import LawInputs
     from robot_side.laws.law import Law
     from robot_side.surroundings.perceived import ObjectSource
+    from robot_side.tick.sensed import Sensed
+    from robot_side.tick.situation import Situation
 
 _PLACES: Final = {
     "Arm": "robot_side.arm.port",
-    "Contact": "feelahead.both_sides.history",
     "Controller": "operator_side.controller.port",
     "DelayLine": "common.link_model",
     "Episode": "feelahead.both_sides.episode",
     "FingerInput": "operator_side.people.port",
-    "History": "feelahead.both_sides.history",
     "Law": "robot_side.laws.law",
     "LawInputs": "robot_side.laws.inputs",
     "LinkProfile": "common.link_model",
     "ObjectSource": "robot_side.surroundings.perceived",
     "Person": "operator_side.people.port",
     "Seen": "operator_side.people.port",
+    "Sensed": "robot_side.tick.sensed",
+    "Situation": "robot_side.tick.situation",
     "enlargement_distance": "robot_side.enlargement",
     "overlaps": "robot_side.overlap",
 }
@@ -43,18 +44,18 @@ _PLACES: Final = {
 
 __all__ = [  # made by __getattr__
     "Arm",
-    "Contact",
     "Controller",
     "DelayLine",
     "Episode",
     "FingerInput",
-    "History",
     "Law",
     "LawInputs",
     "LinkProfile",
     "ObjectSource",
     "Person",
     "Seen",
+    "Sensed",
+    "Situation",
     "enlargement_distance",
     "overlaps",
 ]

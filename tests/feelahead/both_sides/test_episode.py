@@ -11,11 +11,9 @@ import feelahead
 from common.errors import ConfigurationError, FeelaheadError
 from common.recording.reading import open_recording
 from common.roles import Role
-from feelahead import Episode, FingerInput, LawInputs, LinkProfile, Seen
+from feelahead import Episode, FingerInput, LawInputs, LinkProfile, Seen, Sensed, Situation
 from robot_side.settings import CameraSettings
 from robot_side.surroundings.perceived import ObjectSource, PerceivedObjects
-from robot_side.tick.sensed import Sensed
-from robot_side.tick.situation import Situation
 from tests.helpers.repository import DATA
 
 WALL: dict[str, Any] = {"scene": "wall", "link": "delay 100ms", "seed": 3}
