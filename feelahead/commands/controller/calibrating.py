@@ -36,7 +36,7 @@ class Calibrating:
         self._told: str | None = None
 
     def found(self, controller: OpenController) -> None:
-        """Take the controller, or take it again and wait for the present step anew."""
+        """Take the controller, or take it again: the wait for the present step begins again."""
         if not self._keeping.begin(controller):
             self._procedure.resume()
 
