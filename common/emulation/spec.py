@@ -106,6 +106,11 @@ def unused_clauses(link: LinkSpec, carried: Iterable[tuple[Direction, Stream]]) 
     ]
 
 
+def clause_names() -> list[str]:
+    """Return the names that clauses may have; a clause without a name has the empty one."""
+    return ["", *_names()]
+
+
 def _names() -> list[str]:
     directions, streams = get_args(Direction), get_args(Stream)
     return [*directions, *streams, *(f"{direction}.{stream}" for direction in directions for stream in streams)]

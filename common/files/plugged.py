@@ -24,6 +24,8 @@ PLURALS: Final[Mapping[str, str]] = {
 }
 """Names of the entry points' groups, after `feelahead.`, by kind"""
 _LONGEST_FAULT: Final = 200
+_OBJECT: Final = "object:"
+_OURS: Final = Path(__file__).parents[2]
 
 
 @dataclass(frozen=True)
@@ -61,9 +63,19 @@ def known(kind: str) -> list[str]:
     return [point.name for point in _points(kind)]
 
 
+def object_name(part: object) -> str:
+    """Return the name under which a part that was given as an object is recorded; nothing is found by it."""
+    return f"{_OBJECT}{getattr(part, '__qualname__', type(part).__qualname__)}"
+
+
+def is_elsewhere(name: str) -> bool:
+    """Return whether a recorded name is that of a file or an object, neither of which belongs to this machine."""
+    return name.endswith(".py") or name.startswith(_OBJECT)
+
+
 def require_name(kind: str, name: str, built_in: Collection[str]) -> None:
     """Raise ConfigurationError unless `name` is known, or a file; no file is read, and nobody's code is run."""
-    if name not in built_in and not name.endswith(".py") and name not in (others := known(kind)):
+    if name not in built_in and not is_elsewhere(name) and name not in (others := known(kind)):
         raise _unknown(kind, name, [*built_in, *others])
 
 
@@ -84,7 +96,7 @@ def load_file(kind: str, path: Path) -> object:
     module = sys.modules[spec.name] = module_from_spec(spec)
     try:
         spec.loader.exec_module(module)
-    except Exception as error:  # anybody's code
+    except (Exception, SystemExit) as error:  # anybody's code
         raise ConfigurationError(f"{kind} {path}: {fault_in_words(error)}") from error
     if not hasattr(module, kind):
         raise ConfigurationError(f"{kind} {path}: the file defines no {kind}; valid: {valid}")
@@ -147,20 +159,25 @@ def _package(point: EntryPoint) -> str:
     return "a package" if point.dist is None else f"{point.dist.name} {point.dist.version}"
 
 
-def fault_in_words(error: Exception) -> str:
-    """Return an error of somebody's code in one line, with the line of the file where it arose."""
-    line = next(
-        (f", line {number}" for number in [getattr(error, "lineno", None)] if number is not None),
-        _line_of(error),
-    )
+def fault_in_words(error: BaseException) -> str:
+    """Return an error of somebody's code in one line, with the last line of theirs that led to it."""
     said = " ".join(str(error).split()) or "no reason given"
-    return f"{type(error).__name__}{line}: {said}"[:_LONGEST_FAULT]
+    line = getattr(error, "lineno", None)
+    where = _line_of(error) if line is None else f", line {line}"
+    return f"{type(error).__name__}{where}: {said}"[:_LONGEST_FAULT]
 
 
-def _line_of(error: Exception) -> str:
-    frame = error.__traceback__
-    while frame is not None and frame.tb_next is not None:
+def _line_of(error: BaseException) -> str:
+    frames, frame = list[tuple[Path, int]](), error.__traceback__
+    while frame is not None:
+        frames.append((Path(frame.tb_frame.f_code.co_filename), frame.tb_lineno))
         frame = frame.tb_next
-    if frame is None or "importlib" in frame.tb_frame.f_code.co_filename:
-        return ""
-    return f", {Path(frame.tb_frame.f_code.co_filename).name} line {frame.tb_lineno}"
+    ours = [_OURS / package for package in ("common", "robot_side", "operator_side", "feelahead")]
+    theirs = [
+        (path, line)
+        for path, line in frames
+        if not any(path.is_relative_to(folder) for folder in ours) and "importlib" not in str(path)
+    ]
+    # Theirs, and not what theirs has called.
+    own = [one for one in theirs if "site-packages" not in one[0].parts] or theirs
+    return f", {own[-1][0].name} line {own[-1][1]}" if own else ""

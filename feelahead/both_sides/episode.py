@@ -12,10 +12,10 @@ import numpy.typing as npt
 from common.arrays import FloatArray
 from common.emulation.spec import LinkSpec
 from common.errors import ConfigurationError, FeelaheadError
-from common.files.plugged import made_of
 from common.link_model import LinkProfile
-from common.protocol.view_messages import ViewName
-from feelahead.both_sides.episode_settings import link_clauses, require_settings, side_settings
+from common.protocol.view_messages import VIEW_NAMES, ViewName
+from feelahead.both_sides.episode_hands import LONGEST_ARMING_S, hands_of, why_not_armed
+from feelahead.both_sides.episode_settings import absolute, law_setting, link_clauses, require_settings, side_settings
 from feelahead.both_sides.history import Contact, History, Sampler
 from feelahead.both_sides.loopback import VIRTUAL_CLOCK, Loopback, Person
 from operator_side import events as operator_events
@@ -25,10 +25,9 @@ from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.people.arming_hands import ArmingHands
 from operator_side.people.person import SimulatedOperator
 from operator_side.people.port import FingerInput, Pulling
-from operator_side.people.settings import PersonSettings
-from operator_side.people.simulated_hands import own_person, simulated_hands
 from operator_side.settings import OperatorSettings
 from operator_side.viewing.pages.driving_page import DrivingPage
+from robot_side.arm.own_arm import moved_by
 from robot_side.compiled.warm_up import warm_up
 from robot_side.core.robot_parts import RobotParts
 from robot_side.core.robot_side import RobotSide
@@ -42,16 +41,8 @@ from robot_side.tick import events
 if TYPE_CHECKING:
     from feelahead.both_sides.episode_recording import EpisodeRecording
 
-LONGEST_ARMING_S: Final = 30.0
 _LOOK_S: Final = 0.01
 _DONE_S: Final = 0.05
-_MOVES: Final = {
-    "command": "joint_velocity_rad_s, valid_until_s",
-    "command_gripper": "closing, valid_until_s",
-    "state": "now_s",
-}
-GRASPING: Final = "grasping"
-"""Name of the built-in person, who grasps the target, lifts it and sets it down"""
 
 
 class Episode:
@@ -83,8 +74,8 @@ class Episode:
 
         link: netem's words, a profile for both directions, or profiles by name, such as `to_robot` (`LinkSpec`).
         law: a name, a FILE.py, or an object (`robot_side.laws.own.OwnLaw`). person: who acts in `step` and `run`: an
-        object with `act` (`operator_side.people.port.Person`), a FILE.py, `grasping`, PersonSettings, or what makes one
-        from the controller. perception, arm: functions that get the simulated camera, or arm, and return the one to
+        object with `act` (`operator_side.people.port.Person`) or what makes one, a FILE.py, `grasping`, or
+        PersonSettings. perception, arm: functions that get the simulated camera, or arm, and return the one to
         use. robot, operator: all settings of a side. device: the simulated controller. world: loads the scene.
         sampled: whether there is a `history`.
         ConfigurationError names a setting that is unknown or out of range, and what is valid.
@@ -93,7 +84,7 @@ class Episode:
         self._given |= {"link": link} if isinstance(link, str) and link else {}
         self._link = None if isinstance(link, str) else link_clauses(link)
         require_settings(self._given)
-        self.law, self.person, self.perception, self.arm_port = law, person, perception, arm
+        self.law, self.person, self.perception, self.own_arm = map(absolute, (law, person, perception, arm))
         self._device, self._world, self._pages = device, world, pages
         self._bases = robot, operator
         self._recording: EpisodeRecording | None = None
@@ -101,8 +92,8 @@ class Episode:
         self._build()
 
     def _build(self) -> None:
-        named = {"law": self.law} if isinstance(self.law, str) else {}
-        self.settings = robot = side_settings(RobotSettings, self._bases[0], self._given | named)
+        named = self._given | law_setting(self.law)
+        self.settings = robot = side_settings(RobotSettings, self._bases[0], named)
         self.operator_settings = side_settings(OperatorSettings, self._bases[1], self._given)
         if (robot.model is None) != (robot.site is None):
             given, missing = ("model", "site") if robot.site is None else ("site", "model")
@@ -115,7 +106,7 @@ class Episode:
         self.parts = replace(
             parts,
             camera=perceived_by(self.perception, parts.camera),
-            arm=made_of("arm", self.arm_port, parts.arm, _MOVES),
+            arm=moved_by(self.own_arm, parts.arm),
         )
         self._sampler = None
         if self._sampled:
@@ -129,7 +120,9 @@ class Episode:
         self.device = self._device or SimulatedDualSense()
         self._inputs = FingerInput()
         self._idle = ArmingHands(self.device, Pulling(lambda _: self._inputs))
-        self.hands: Person = self._hands_of(self.person)
+        self.hands: Person = self._idle
+        if self.person is not None:
+            self.hands = hands_of(self.person, self.device, self.operator_settings)
         self.loop = Loopback(
             robot_side, operator, self.device, self.hands, robot, self.operator_settings, self._pages, self._link_spec()
         )
@@ -137,21 +130,6 @@ class Episode:
     def _link_spec(self) -> LinkSpec | None:
         settings = self.settings
         return None if self._link is None else LinkSpec(self._link, settings.seed, settings.link_model)
-
-    def _hands_of(self, person: object) -> Person:
-        """Return the hands at the controller for a person in any form; ConfigurationError for something else."""
-        if person is None:
-            return self._idle
-        settings = self.operator_settings
-        if person == GRASPING or isinstance(person, PersonSettings):
-            about = person if isinstance(person, PersonSettings) else settings.person
-            calibration, swap_sides = settings.calibration, settings.swap_sides
-            return simulated_hands(self.device, about, settings.seed, calibration, swap_sides=swap_sides)
-        if callable(person) and not isinstance(person, type) and not hasattr(person, "act"):
-            person = person(self.device)
-        if hasattr(person, "tick"):
-            return person
-        return ArmingHands(self.device, own_person(person))
 
     @property
     def time_s(self) -> float:
@@ -184,15 +162,15 @@ class Episode:
         """Time since when the hands act; FeelaheadError before."""
         hands = self.loop.person
         if not isinstance(hands, ArmingHands) or hands.began_s is None:
-            raise FeelaheadError("the hands do not act yet; valid: after arm()")
+            raise FeelaheadError("the hands do not act; valid: after arm(), and not with the person grasping")
         return hands.began_s
 
     def arm(self) -> Self:
         """Run until the arm is armed and the hands act; FeelaheadError, with the reason, if that takes over 30 s."""
-        hands = self.loop.person
+        hands, until_s = self.loop.person, self.time_s + LONGEST_ARMING_S
         while not self.armed or (isinstance(hands, ArmingHands) and hands.began_s is None):
-            if self.time_s >= LONGEST_ARMING_S:
-                raise FeelaheadError(self._why_not_armed())
+            if self.time_s >= until_s:
+                raise FeelaheadError(why_not_armed(self.loop, self.settings.link))
             self._advance(self.time_s + _LOOK_S)
         return self
 
@@ -210,16 +188,18 @@ class Episode:
 
         r2_n, l2_n: forces on the triggers, in newtons. Sticks: right and up positive, -1 to 1 each.
         """
-        if not (math.isfinite(seconds) and seconds >= 0.0):
-            raise ValueError(f"seconds = {seconds}; valid: a number from 0 on")
+        _require_seconds(seconds)
         self._inputs = FingerInput(r2_n, l2_n, left_stick, right_stick, frozenset(buttons))
         self._advance(self.time_s + seconds)
         return self
 
     def run(self, person: object = None, seconds: float = 60.0) -> Self:
         """Run until the person has finished, at most for `seconds`; person: as for the constructor, else that one."""
+        _require_seconds(seconds)
         if person is not None:
-            self.loop.person = self._hands_of(person)
+            self.loop.person = hands_of(person, self.device, self.operator_settings)
+        elif self.loop.person is self._idle:
+            raise ValueError("run: there is no person; valid: run(person), or step(seconds, r2_n=...)")
         end_s = self.time_s + seconds
         while self.time_s < end_s and not self.done:
             self._advance(min(self.time_s + _DONE_S, end_s))
@@ -232,9 +212,16 @@ class Episode:
         return isinstance(hands, ArmingHands | SimulatedOperator) and hands.phase == "done"
 
     def reset(self, seed: int | None = None) -> Self:
-        """Begin anew, with all settings as before but the seed, if one is given."""
+        """Begin anew, with all settings as before but the seed, if one is given.
+
+        Laws, people and other parts that were given as classes, functions or files are made anew; objects are kept.
+        """
+        if self._device is not None:
+            raise ValueError("reset: a controller that was given cannot begin anew; valid: Episode without device")
+        given = self._given | ({} if seed is None else {"seed": seed})
+        side_settings(RobotSettings, self._bases[0], given)
         self.close()
-        self._given |= {} if seed is None else {"seed": seed}
+        self._given = given
         self._build()
         return self
 
@@ -244,6 +231,8 @@ class Episode:
 
     def picture(self, view: ViewName = "overview", *, width: int = 640, height: int = 480) -> npt.NDArray[np.uint8]:
         """Return what the camera sees now, RGB (height, width, 3); FeelaheadError where nothing can be rendered."""
+        if view not in VIEW_NAMES:
+            raise ValueError(f"view = {view!r}; valid: {', '.join(VIEW_NAMES)}")
         from feelahead.both_sides.snapshots import Snapshots  # noqa: PLC0415  # needs Pillow, and a process
 
         with Snapshots(self.scene, width, height) as snapshots:
@@ -258,8 +247,11 @@ class Episode:
 
         if self.time_s > 0.0:
             raise ValueError(f"record {path}: the episode is at {self.time_s:.2f} s; valid: before it begins")
-        self.close()
-        self._recording = EpisodeRecording(Path(path), self.settings, self.operator_settings, wall_clock_s)
+        if self._recording is not None:
+            raise ValueError(f"record {path}: a recording has begun already; valid: one, or reset() first")
+        parts = {"person": self.person, "perception": self.perception, "arm": self.own_arm, "link": self._link}
+        given = {name: str(part) for name, part in parts.items() if part is not None}
+        self._recording = EpisodeRecording(Path(path), self.settings, self.operator_settings, wall_clock_s, given)
         self._build()
         self._recording.follow(self.loop)
         return self
@@ -268,7 +260,7 @@ class Episode:
         """Finish the recording, if there is one."""
         recording, self._recording = self._recording, None
         if recording is not None:
-            recording.close()
+            recording.close(self.time_s)
 
     def __enter__(self) -> Self:
         return self
@@ -289,15 +281,10 @@ class Episode:
             raise ValueError("the episode is not sampled; valid: Episode(sampled=True)")
         return self._sampler
 
-    def _why_not_armed(self) -> str:
-        robot, hands = self.loop.robot, self.loop.person
-        stops = robot.session.safety.stops
-        why = f"{stops[-1][1]}; " if stops else ""
-        grip = " and did not grip" if isinstance(hands, ArmingHands) and hands.phase == "grip" else ""
-        return (
-            f"the robot was not armed{grip} within {LONGEST_ARMING_S:g} s over --link {self.settings.link!r}: {why}"
-            f"loop age {robot.loop_age_s(self.time_s):.2f} s, {robot.session.motion_received} commands arrived"
-        )
+
+def _require_seconds(seconds: float) -> None:
+    if not (isinstance(seconds, int | float) and math.isfinite(seconds) and seconds >= 0.0):
+        raise ValueError(f"seconds = {seconds!r}; valid: a number from 0 on")
 
 
 def _load(settings: RobotSettings) -> Scene:

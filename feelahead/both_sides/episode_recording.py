@@ -1,6 +1,6 @@
 """Recording of an episode, as both sides make one: inputs, messages and status, in an MCAP file."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, Final
 
@@ -27,8 +27,18 @@ _FLUSH_BLOCKS: Final = 15
 class EpisodeRecording:
     """Recording of both sides. `robot` and `operator` are their listeners; `write` is called at `next_s`."""
 
-    def __init__(self, path: Path, robot: RobotSettings, operator: OperatorSettings, wall_clock_s: float = 0.0) -> None:
-        """Check the path. wall_clock_s: time of day, in seconds since 1970, at the episode's start."""
+    def __init__(
+        self,
+        path: Path,
+        robot: RobotSettings,
+        operator: OperatorSettings,
+        wall_clock_s: float,
+        given: Mapping[str, str],
+    ) -> None:
+        """Check the path. wall_clock_s: time of day, in seconds since 1970, at the episode's start.
+
+        given: what the settings do not say of the episode, in words.
+        """
         require_output_file("record", path)
         require_recordable(path)
         self._noted: tuple[list[Any], list[Any]] = ([], [])
@@ -39,7 +49,8 @@ class EpisodeRecording:
         self._status: tuple[Callable[[float], SideStatus], ...] = ()
         self._file = RecordingFile(path, wall_clock_s)
         self._content = Content(self._file)
-        self._blocks = 0
+        self._given = given
+        self._blocks, self._written_s = 0, 0.0
         self._path = path
 
     def follow(self, loop: Loopback) -> None:
@@ -47,7 +58,7 @@ class EpisodeRecording:
         self._status = loop.robot.status, loop.operator.status
         robot, operator = self._settings
         headers = (
-            {"side": "robot", **provenance(robot, 1, VIRTUAL_CLOCK), "kernels": kernel_digests()},
+            {"side": "robot", **provenance(robot, 1, VIRTUAL_CLOCK), "kernels": kernel_digests(), "given": self._given},
             {"side": "operator", **provenance(operator, 2, VIRTUAL_CLOCK)},
         )
         for source, header in enumerate(headers):
@@ -68,16 +79,18 @@ class EpisodeRecording:
 
             entries = b"".join(self._encoders[source].encode(entry, view)[1] for entry in noted)
             noted.clear()
-            self._content.write(source, BLOCK + pack_block(self._blocks, 0, now_s - BLOCK_S, now_s, entries))
+            self._content.write(source, BLOCK + pack_block(self._blocks, 0, self._written_s, now_s, entries))
             for seen in views:
                 self._content.write(source, VIEW + seen)
             self._content.write(source, STATUS + stamped(now_s) + as_json(self._status[source](now_s)))
-        self._blocks += 1
+        self._blocks, self._written_s = self._blocks + 1, now_s
         if self._blocks % _FLUSH_BLOCKS == 0:
             self._file.flush()
 
-    def close(self) -> None:
-        """Finish the file; FeelaheadError if it could not be written."""
+    def close(self, now_s: float) -> None:
+        """Write the rest, until `now_s`, and finish the file; FeelaheadError if it could not be written."""
+        if now_s > self._written_s:
+            self.write(now_s)
         self._file.close()
         if self._file.error is not None:
             raise FeelaheadError(f"record {self._path}: {self._file.error}")

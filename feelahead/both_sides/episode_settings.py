@@ -2,10 +2,15 @@
 
 from collections.abc import Collection, Mapping
 from dataclasses import replace
+from pathlib import Path
 from typing import Any, Final, TypeVar
 
+import numpy as np
+
 from common.command.command_line import settings_of
+from common.emulation.spec import clause_names
 from common.errors import ConfigurationError
+from common.files.plugged import object_name
 from common.link_model import LinkProfile
 from operator_side.settings import OperatorSettings
 from robot_side.settings import RobotSettings
@@ -30,7 +35,8 @@ def require_settings(names: Collection[str]) -> None:
 
 def side_settings(kind: type[_Settings], base: _Settings | None, given: Mapping[str, Any]) -> _Settings:
     """Return a side's settings: those of `given` that it has, on top of `base`; ConfigurationError for a bad value."""
-    mine = {name: value for name, value in given.items() if name in kind.__dataclass_fields__}
+    plain = {name: value.item() if isinstance(value, np.generic) else value for name, value in given.items()}
+    mine = {name: value for name, value in plain.items() if name in kind.__dataclass_fields__}
     return settings_of(mine, kind, "Episode") if base is None else replace(base, **mine)
 
 
@@ -41,4 +47,18 @@ def link_clauses(link: LinkProfile | Mapping[str, LinkProfile]) -> Mapping[str, 
         raise ConfigurationError(
             f"Episode: link is a {type(link).__name__}; valid: netem's words, a LinkProfile, or LinkProfiles by name"
         )
+    if unknown := clauses.keys() - set(clause_names()):
+        valid = ", ".join(filter(None, clause_names()))
+        raise ConfigurationError(f"Episode: link: {', '.join(sorted(unknown))}: no such direction; valid: {valid}")
     return clauses
+
+
+def absolute(part: object) -> object:
+    """Return a part that is named; a file by its whole path, so that it is found from any folder later."""
+    name = str(part) if isinstance(part, str | Path) else ""
+    return str(Path(name).absolute()) if name.endswith(".py") else part
+
+
+def law_setting(law: object) -> dict[str, str]:
+    """Return the robot side's setting that names the law; an object by what it is."""
+    return {} if law is None else {"law": law if isinstance(law, str) else object_name(law)}

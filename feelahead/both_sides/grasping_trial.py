@@ -10,9 +10,11 @@ from common.emulation.clauses import LinkModel
 from common.periods import TURN
 from common.protocol.uniform_field import uniform_field
 from common.roles import Role
-from feelahead.both_sides.episode import GRASPING, Episode
+from feelahead.both_sides.episode import Episode
+from feelahead.both_sides.episode_hands import GRASPING
 from feelahead.both_sides.not_placed import why_not_placed
 from operator_side.controller.feel import MAX_STRENGTH
+from operator_side.dualsense.simulated.trigger_model import zone_of
 from operator_side.people.person import SimulatedOperator
 from operator_side.people.settings import PersonSettings
 from operator_side.settings import OperatorSettings
@@ -152,7 +154,8 @@ class Watch(Listener):
     def strength_of(self, trigger: int) -> int | None:
         """Return the strength of the zone that the trigger has reached; None for a trigger that is not pulled."""
         device = self.loopback.device
-        return device.strength[trigger] if device.travel[trigger] > 0.0 else None
+        travel = device.travel[trigger]
+        return device.strengths[trigger][zone_of(travel)] if travel > 0.0 else None
 
 
 def run_trial(trial: Trial, seed: int, sample: Callable[[Watch], None] = lambda _: None) -> dict[str, Any]:

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from common.arrays import BoolArray, FloatArray
-from common.protocol.messages import TriggerField
 from robot_side.tick import events
 from robot_side.tick.events import Listener
 
@@ -42,7 +41,10 @@ class Contact:
 
 @dataclass(frozen=True)
 class History:
-    """Samples of an episode, every 8 ms. Along a trigger's axis L2 comes first, then R2. NaN: unknown."""
+    """Samples of an episode, each at the first turn after a further 8 ms. NaN: unknown.
+
+    Along a trigger's axis L2 comes first, then R2.
+    """
 
     time_s: FloatArray
     """(n,) virtual time, which both sides share"""
@@ -50,8 +52,8 @@ class History:
     """(n,) whether the arm follows commands"""
     tool_position_m: FloatArray
     """(n, 3) true position of the tool, in the world frame"""
-    tool_speed_m_s: FloatArray
-    """(n,) true speed of the tool along its approach axis, along which R2 advances"""
+    approach_speed_m_s: FloatArray
+    """(n,) true speed of the tool along its approach axis, along which R2 advances; negative while it retreats"""
     joint_positions_rad: FloatArray
     """(n, j) true positions of the arm's joints; metres for a prismatic joint"""
     travel: FloatArray
@@ -61,14 +63,14 @@ class History:
     strength: FloatArray
     """(n, 2) strength of the zone that each trigger has reached, 0 to 8; 0 for a trigger that is not pulled"""
     onset_distances_m: FloatArray
-    """(n, 2, 8) ways along the trigger's direction at which the strengths begin, as the law found them; at most the
-    horizon"""
+    """(n, 2, 8) ways along the trigger's direction at which the strengths begin, as the law found them, at most the
+    horizon: the fast list, which zones above 45 mm/s use"""
     rumble: FloatArray
     """(n,) drive of the left motor, 0 to 1"""
     enlargement_m: FloatArray
-    """(n,) enlargement along the motion, D_incr of eq. 10"""
+    """(n,) enlargement along the motion, D_incr of eq. 10; 0 by a law that tells none"""
     overlap_m3: FloatArray
-    """(n,) overlap of the enlarged gripper with all objects (eq. 11-12), as the law found it"""
+    """(n,) overlap of the enlarged gripper with all objects (eq. 11-12), as the law found it, else 0"""
     loop_age_s: FloatArray
     """(n,) t_d of eq. 8; the configured worst case while unknown"""
     true_gap_m: FloatArray
@@ -123,7 +125,8 @@ class Sampler(Listener):
             self.contacts.append(Contact(now_s, onset.thing, onset.gripper_part, onset.closing_speed_m_s))
             self._fastest_m_s = max(onset.closing_speed_m_s, np.nan_to_num(self._fastest_m_s, nan=-math.inf))
         if now_s >= self._next_s - 1e-9:
-            self._next_s = now_s + PERIOD_S
+            late = now_s - self._next_s >= PERIOD_S  # also before the first sample
+            self._next_s = (now_s if late else self._next_s) + PERIOD_S
             self._rows.append(self._row(now_s, held))
             self._fastest_m_s = math.nan
 
@@ -149,8 +152,8 @@ class Sampler(Listener):
             data.qpos[robot.arm_positions].copy(),
             device.travel,
             strengths,
-            device.strength,
-            np.full((2, 8), math.nan) if sensed is None else [_onsets(sensed.l2), _onsets(sensed.r2)],
+            tuple(map(float, device.strength)),
+            np.full((2, 8), math.nan) if sensed is None else [sensed.l2.fast_m, sensed.r2.fast_m],
             device.rumble.left,
             math.nan if sensed is None else sensed.enlargement_m,
             math.nan if sensed is None else sensed.overlap_m3,
@@ -158,7 +161,3 @@ class Sampler(Listener):
             self._truth.gap_m(held),
             self._fastest_m_s,
         )
-
-
-def _onsets(field: TriggerField) -> tuple[float, ...]:
-    return field.fast_m

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 from common.arrays import FloatArray
 from common.errors import ConfigurationError
+from common.files.plugged import is_elsewhere
 from common.recording.entries import Kind, split_text
 from common.recording.provenance import processor_name, settings_from
 from common.recording.reading import Recording
@@ -61,9 +62,9 @@ def replay_robot(recording: Recording) -> Comparison:
     """Compute the robot side's messages again and compare them; ConfigurationError if the side was not recorded."""
     header = require_side(recording, "robot")
     settings = replace(settings_from(header["settings"], RobotSettings), perception=None)  # its frames are recorded
-    if settings.law.endswith(".py"):  # a recording may be anybody's, and must run nobody's code
+    if is_elsewhere(settings.law):  # a recording may be anybody's, and must run nobody's code
         raise ConfigurationError(
-            f"recorded with the law of the file {settings.law}, which replay does not run; valid: a built-in law, or"
+            f"recorded with the law {settings.law}, which replay does not run; valid: a built-in law, or"
             " one of an installed package; what works: feelahead replay without --check, export, plot"
         )
     parts = build_parts(settings, header["epoch"], header["clock_domain"])

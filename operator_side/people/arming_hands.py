@@ -83,7 +83,7 @@ class ArmingHands:
         felt = device.travel, device.strength, device.rumble.left
         try:
             hands = self.person.act(Seen(now_s - self.began_s, screen, *felt, delay_s))
-        except Exception as error:  # perhaps somebody else's code
+        except (Exception, SystemExit) as error:  # perhaps somebody else's code
             raise FeelaheadError(f"person {type(self.person).__name__}: {fault_in_words(error)}") from error
         if not isinstance(hands, FingerInput | None):
             raise FeelaheadError(

@@ -1,11 +1,14 @@
 """Port of a person who acts at the controller: what they see and feel in, forces and sticks out."""
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
+from typing import Final, Protocol, runtime_checkable
 
 from common.protocol.messages import Telemetry, Vector2
 from operator_side.controller.state import Button
+
+_STICK: Final = ("right", "up")
 
 
 @dataclass(frozen=True)
@@ -18,6 +21,19 @@ class FingerInput:
     right_stick: Vector2 = (0.0, 0.0)
     buttons: frozenset[Button] = frozenset()
     """Buttons that are held besides hold-to-run"""
+
+    def __post_init__(self) -> None:
+        """Raise ValueError for a force or a stick out of range."""
+        for name in ("r2_n", "l2_n"):
+            force_n = getattr(self, name)
+            if not (isinstance(force_n, int | float) and 0.0 <= force_n < math.inf):
+                raise ValueError(f"{name} = {force_n!r}; valid: a force of 0 N or more")
+        for name in ("left_stick", "right_stick"):
+            stick = getattr(self, name)
+            if len(stick) != len(_STICK) or not all(-1.0 <= part <= 1.0 for part in stick):
+                raise ValueError(f"{name} = {stick}; valid: right and up, -1 to 1 each")
+        if not all(isinstance(button, Button) for button in self.buttons):
+            raise ValueError(f"buttons = {self.buttons}; valid: a set of Button")
 
 
 @dataclass(frozen=True)

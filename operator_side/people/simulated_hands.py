@@ -2,7 +2,8 @@
 
 from pathlib import Path
 
-from common.files.plugged import find, require_methods
+from common.errors import ConfigurationError
+from common.files.plugged import fault_in_words, find, require_methods
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.hands.travel_calibration import TravelCalibration
 from operator_side.people.arming_hands import ArmingHands
@@ -37,8 +38,11 @@ def own_person(given: object) -> Person:
     ConfigurationError if it has no `act`.
     """
     person = find("person", str(given), {}) if isinstance(given, str | Path) else given
-    if isinstance(person, type) or not hasattr(person, "act"):
-        person = person() if callable(person) else person
+    if callable(person) and (isinstance(person, type) or not hasattr(person, "act")):
+        try:
+            person = person()
+        except (Exception, SystemExit) as error:  # anybody's code
+            raise ConfigurationError(f"person: cannot be made without arguments: {fault_in_words(error)}") from error
     require_methods("person", person, {"act": "seen"})
     assert isinstance(person, Person)  # noqa: S101  # it has the method
     return person

@@ -28,7 +28,7 @@ class OwnLaw:
             )
         try:
             self._law = given(inputs) if makes else given
-        except Exception as error:  # anybody's code
+        except (Exception, SystemExit) as error:  # anybody's code
             said = fault_in_words(error)
             raise ConfigurationError(f"law {name}: cannot be made from the law's inputs: {said}") from error
         require_methods(f"law {name}", self._law, {"sense": "situation, now_s"})
@@ -36,10 +36,7 @@ class OwnLaw:
 
     def sense(self, situation: Situation, now_s: float) -> Sensed:
         """Return the law's result; FeelaheadError if it fails, or the result is none: the run ends, and says why."""
-        try:
-            sensed = self._law.sense(situation, now_s)
-        except Exception as error:  # anybody's code
-            raise FeelaheadError(f"law {self._name}: {fault_in_words(error)}") from error
+        sensed = self._call("sense", situation, now_s)
         if not isinstance(sensed, Sensed):
             raise FeelaheadError(
                 f"law {self._name}: sense returned a {type(sensed).__name__}; valid: a Sensed, as inputs.sensed makes"
@@ -48,20 +45,28 @@ class OwnLaw:
 
     def around(self, pose: GripperPose) -> Around | None:
         """Return the law's map of onset distances, if it has one."""
-        return self._law.around(pose) if hasattr(self._law, "around") else None
+        around: Around | None = self._call("around", pose)
+        return around
 
     def summary(self) -> dict[str, int]:
         """Return the law's counts, if it has any."""
-        return self._law.summary() if hasattr(self._law, "summary") else {}
+        return self._call("summary") or {}
 
     def expect(self, probability: float) -> None:
         """Pass on another P of eq. 10 to a law that takes one."""
-        if hasattr(self._law, "expect"):
-            self._law.expect(probability)
+        self._call("expect", probability)
 
     def explain(self, trigger: Trigger, situation: Situation, sensed: Sensed) -> TriggerExplained:
         """Return the law's terms and overlaps, if it explains itself."""
-        if hasattr(self._law, "explain"):
-            explained: TriggerExplained = self._law.explain(trigger, situation, sensed)
-            return explained
-        return TriggerExplained(_NO_TERMS, {})
+        return self._call("explain", trigger, situation, sensed) or TriggerExplained(_NO_TERMS, {})
+
+    def _call(self, method: str, *arguments: object) -> Any:
+        """Call a method of the law's, if it has it; FeelaheadError if it fails."""
+        if not hasattr(self._law, method):
+            return None
+        try:
+            return getattr(self._law, method)(*arguments)
+        except FeelaheadError:
+            raise
+        except (Exception, SystemExit) as error:  # anybody's code
+            raise FeelaheadError(f"law {self._name}: {method}: {fault_in_words(error)}") from error

@@ -20,7 +20,7 @@ class OwnPerception:
         """Return its newest frame; FeelaheadError if it fails, or returns none."""
         try:
             frame = self._part.perceive(now_s)
-        except Exception as error:  # anybody's code
+        except (Exception, SystemExit) as error:  # anybody's code
             raise FeelaheadError(f"perception {type(self._part).__name__}: {fault_in_words(error)}") from error
         if not isinstance(frame, PerceivedObjects):
             raise FeelaheadError(

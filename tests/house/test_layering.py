@@ -38,7 +38,7 @@ ARROWS = """
     robot_side/operators: common common/emulation common/protocol
     robot_side/tick/truth.py: common
     robot_side/overlap/digits: common robot_side/compiled
-    robot_side/arm: common common/protocol robot_side/compiled
+    robot_side/arm: common common/files common/protocol robot_side/compiled
     robot_side/enlargement: common common/protocol robot_side/compiled
     robot_side/overlap/solids: common robot_side/compiled robot_side/overlap/digits
     robot_side/overlap/precise: common robot_side/compiled robot_side/overlap/digits robot_side/overlap/solids

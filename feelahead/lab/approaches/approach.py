@@ -184,10 +184,10 @@ def run_approach(approach: Approach) -> Outcome:
     run = PullRun(approach)
     try:
         began_s = run.arm()
+        for _ in run.go_on(began_s + approach.duration_s):
+            pass
     except FeelaheadError as error:
         return Outcome("failed", None, None, math.nan, None, None, 0, 0.0, run.trace(), str(error))
-    for _ in run.go_on(began_s + approach.duration_s):
-        pass
     return _outcome(run)
 
 

@@ -4,7 +4,8 @@ from dataclasses import dataclass
 from typing import Final
 
 from common.protocol.messages import Vector2
-from feelahead.both_sides.episode import GRASPING, Episode
+from feelahead.both_sides.episode import Episode
+from feelahead.both_sides.episode_hands import GRASPING
 from feelahead.lab.approaches.frozen import ASIDE, GRIPPED, SITE, frozen_scene
 from operator_side.controller.feel import MAX_STRENGTH
 from operator_side.dualsense.simulated.controller import SimulatedDualSense

@@ -33,6 +33,8 @@ _ROUNDING_OF_TICKS = 1e-6
 """Tolerance, in periods, so that rounding of `now_s` does not miss a report that is just due"""
 _BLUETOOTH_SEQUENCE = 1
 """Sequence number in the common block, constant on Bluetooth (controllers wiki)"""
+_PULLED: Final = 1e-3
+"""Least travel of a trigger that counts as pulled: a released one comes back to 0 exponentially"""
 _TRIGGER_BUTTONS: Final = frozenset({Button.L2, Button.R2})
 _EDGE_BUTTONS: Final = frozenset({Button.LEFT_FUNCTION, Button.RIGHT_FUNCTION, Button.LEFT_PADDLE, Button.RIGHT_PADDLE})
 
@@ -127,7 +129,7 @@ class SimulatedDualSense:
     def strength(self) -> tuple[int, int]:
         """Strengths, 0 to 8, of the zones that L2 and R2 have reached; 0 for a trigger that is not pulled."""
         l2, r2 = (
-            strengths[zone_of(travel)] if travel > 0.0 else 0
+            strengths[zone_of(travel)] if travel > _PULLED else 0
             for strengths, travel in zip(self.strengths, self.travel, strict=True)
         )
         return l2, r2

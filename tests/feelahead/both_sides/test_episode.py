@@ -12,6 +12,8 @@ from common.errors import ConfigurationError, FeelaheadError
 from common.recording.reading import open_recording
 from common.roles import Role
 from feelahead import Episode, FingerInput, LawInputs, LinkProfile, Seen, Sensed, Situation
+from feelahead.recordings.replay_robot import replay_robot
+from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from robot_side.settings import CameraSettings
 from robot_side.surroundings.perceived import ObjectSource, PerceivedObjects
 from tests.helpers.repository import DATA
@@ -173,22 +175,22 @@ def test_a_wrong_argument_is_refused_at_once_with_what_is_valid(given: dict[str,
         ({"perception": lambda _: Failing()}, r"^perception Failing: ZeroDivisionError, test_episode.py line \d+: "),
         (
             {"law": lambda _: Failing()},
-            r"^law <lambda>: ZeroDivisionError, test_episode.py line \d+: division by zero$",
+            r"^law <lambda>: sense: ZeroDivisionError, test_episode.py line \d+: division by zero$",
         ),
         (
             {"law": lambda _: Failing(3)},
             r"^law <lambda>: sense returned a int; valid: a Sensed",
         ),
         (
-            {"person": lambda _: Failing()},
+            {"person": Failing},
             r"^person Failing: ZeroDivisionError, test_episode.py line \d+: division by zero",
         ),
-        ({"person": lambda _: Failing(3)}, r"^person Failing: act returned a int; valid: a FingerInput"),
+        ({"person": lambda: Failing(3)}, r"^person Failing: act returned a int; valid: a FingerInput"),
     ],
 )
 def test_a_part_that_fails_ends_the_run_with_its_name_and_line(given: dict[str, Any], said: str) -> None:
     with pytest.raises(FeelaheadError, match=said):
-        Episode(**WALL, **given).run(seconds=3.0)
+        Episode(**WALL, **given).step(3.0)
 
 
 def test_settings_of_a_side_may_be_given_as_texts_tables_or_records() -> None:
@@ -225,3 +227,88 @@ def test_the_face_has_few_names_each_of_which_is_there() -> None:
         assert getattr(feelahead, name) is not None
     with pytest.raises(AttributeError, match="has no attribute 'Epsiode'; valid: Arm, "):
         _ = feelahead.Epsiode
+
+
+class Slow:
+    """Arm that has only what an arm must have."""
+
+    def __init__(self, arm: Any) -> None:
+        self.command_gripper, self.state, self._command = arm.command_gripper, arm.state, arm.command
+
+    def command(self, joint_velocity_rad_s: Any, valid_until_s: float) -> None:
+        self._command(0.5 * joint_velocity_rad_s, valid_until_s)
+
+
+class Broken(Slow):
+    def command(self, joint_velocity_rad_s: Any, valid_until_s: float) -> None:
+        raise KeyError(valid_until_s)
+
+
+def test_an_arm_of_ones_own_needs_three_methods_and_its_faults_are_told() -> None:
+    ways = [Episode(scene="wall", arm=arm).arm().step(0.6, r2_n=2.0).tool_position_m[0] for arm in (None, Slow)]
+    home = Episode(scene="wall").tool_position_m[0]
+    assert ways[1] - home == pytest.approx(0.5 * (ways[0] - home), rel=0.15)
+    with pytest.raises(FeelaheadError, match=r"^arm Broken: KeyError, test_episode.py line \d+: "):
+        Episode(scene="wall", arm=Broken).arm().step(0.5, r2_n=2.0)
+
+
+def test_a_released_trigger_meets_nothing() -> None:
+    history = Episode(**WALL).arm().step(3.0, r2_n=2.0).step(2.0).history
+    assert history.strength[:, 1].max() == 8.0
+    assert tuple(history.strength[-1]) == (0.0, 0.0)
+
+
+def test_arming_late_is_no_fault_and_hands_that_wait_are_named() -> None:
+    class Waits:
+        def act(self, seen: Seen) -> FingerInput | None:
+            return None if seen.since_s > 1.0 else FingerInput()
+
+    episode = Episode(**WALL).step(40.0)
+    assert episode.arm().armed
+    assert episode.run(Waits()).arm().done
+
+
+@pytest.mark.parametrize("given", [{"law": Nearest}, {"link": LinkProfile(delay_s=0.05)}])
+def test_a_recording_says_what_was_given_as_an_object_and_keeps_its_end(given: dict[str, Any], tmp_path: Path) -> None:
+    with Episode(scene="wall", **given).record(tmp_path / "run.mcap") as episode:
+        episode.arm().step(0.123)
+    recording = open_recording(tmp_path / "run.mcap")
+    header = recording.headers["robot"]
+    if "law" in given:
+        assert header["settings"]["law"].startswith("object:")
+        with pytest.raises(ConfigurationError, match="which replay does not run"):
+            replay_robot(recording)
+    else:
+        assert "delay_s=0.05" in header["given"]["link"]
+    assert recording.length_s() == pytest.approx(episode.time_s, abs=0.01)
+
+
+def test_a_second_recording_a_bad_seed_and_a_given_device_are_refused_and_nothing_is_lost(tmp_path: Path) -> None:
+    with Episode(**WALL).record(tmp_path / "run.mcap") as episode:
+        with pytest.raises(ValueError, match="a recording has begun already"):
+            episode.record(tmp_path / "again.mcap")
+        episode.arm()
+    assert open_recording(tmp_path / "run.mcap").length_s() > 1.0
+    with pytest.raises(ConfigurationError, match="seed"):
+        episode.reset("three")  # type: ignore[arg-type]
+    assert episode.reset(np.int64(4)).settings.seed == 4  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="a controller that was given cannot begin anew"):
+        Episode(device=SimulatedDualSense()).reset()
+
+
+@pytest.mark.parametrize(
+    ("does", "said"),
+    [
+        (lambda episode: episode.step(1.0, r2_n=float("nan")), "r2_n = nan; valid: a force of 0 N or more"),
+        (lambda episode: episode.step(1.0, left_stick=(3.0, 0.0)), "left_stick = (3.0, 0.0); valid: right and up"),
+        (lambda episode: episode.step(1.0, buttons="cross"), "valid: a set of Button"),
+        (lambda episode: episode.run(seconds=-1.0), "seconds = -1.0; valid: a number from 0 on"),
+        (lambda episode: episode.run(), "run: there is no person; valid: run(person), or step(seconds"),
+        (lambda episode: episode.picture("side"), "view = 'side'; valid: overview, first_person"),
+        (lambda _: Episode(link={"to_robto": LinkProfile()}), "link: to_robto: no such direction; valid: to_robot,"),
+    ],
+)
+def test_what_cannot_be_done_is_refused_before_it_is(does: Any, said: str) -> None:
+    with pytest.raises(ValueError) as refused:  # noqa: PT011
+        does(Episode(scene="wall"))
+    assert said in str(refused.value)

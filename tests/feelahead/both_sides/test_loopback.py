@@ -11,8 +11,8 @@ import pytest
 from common.periods import TURN_S
 from common.protocol.messages import Compensation
 from common.status.codes import Doing
-from feelahead.both_sides.episode import GRASPING
 from feelahead.both_sides.episode import Episode as Both
+from feelahead.both_sides.episode_hands import GRASPING
 from feelahead.both_sides.loopback import Loopback
 from feelahead.lab.approaches.approach import Approach, PullRun
 from operator_side.controller.feel import USUAL_LIGHT, WARNING_LIGHT

@@ -16,7 +16,8 @@ from common.recording.content import Content
 from common.recording.mcap_file import RecordingFile
 from common.recording.reading import Recording, open_recording
 from common.recording.wire import FACTS, HEADER, VIEW, as_json, stamped
-from feelahead.both_sides.episode import GRASPING, Episode
+from feelahead.both_sides.episode import Episode
+from feelahead.both_sides.episode_hands import GRASPING
 from feelahead.both_sides.episode_recording import BLOCK_S
 from feelahead.both_sides.loopback import Loopback
 

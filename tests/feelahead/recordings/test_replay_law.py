@@ -35,6 +35,6 @@ def test_a_law_that_is_a_file_is_not_run_by_a_replay(tmp_path: Path) -> None:
         episode.arm()
     was_run.unlink()
     sys.modules.pop("feelahead_law_free_law")
-    with pytest.raises(ConfigurationError, match=r"with the law of the file .*free_law.py, which replay"):
+    with pytest.raises(ConfigurationError, match=r"with the law .*free_law.py, which replay"):
         replay_robot(open_recording(tmp_path / "run.mcap"))
     assert not was_run.exists()
