@@ -241,7 +241,7 @@ class Slow:
 
 class Broken(Slow):
     def command(self, joint_velocity_rad_s: Any, valid_until_s: float) -> None:
-        raise KeyError(valid_until_s)
+        raise KeyError(joint_velocity_rad_s, valid_until_s)
 
 
 def test_an_arm_of_ones_own_needs_three_methods_and_its_faults_are_told() -> None:
