@@ -55,8 +55,10 @@ def link_clauses(link: LinkProfile | Mapping[str, LinkProfile]) -> Mapping[str, 
 
 def absolute(part: object) -> object:
     """Return a part that is named; a file by its whole path, so that it is found from any folder later."""
-    name = str(part) if isinstance(part, str | Path) else ""
-    return str(Path(name).absolute()) if name.endswith(".py") and Path(name).is_file() else part
+    if not isinstance(part, str | Path):
+        return part
+    is_file = str(part).endswith(".py") and Path(part).is_file()
+    return str(Path(part).absolute()) if is_file else str(part)
 
 
 def law_setting(law: object) -> dict[str, str]:

@@ -147,6 +147,7 @@ def test_the_scripted_person_does_the_task_and_says_that_it_is_done() -> None:
     ("given", "said"),
     [
         ({"law": "swep"}, "law 'swep': there is no such law; valid: swept, paper"),
+        ({"law": Path("none.py")}, "law none.py: there is no such file; valid: a Python file that defines law"),
         ({"law": 3}, "law int: is a int; valid: a class or function that takes a LawInputs"),
         ({"law": lambda inputs: inputs}, "LawInputs lacks sense(situation, now_s)"),
         ({"law": lambda inputs: inputs.none}, "cannot be made from the law's inputs: AttributeError"),
