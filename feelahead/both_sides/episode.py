@@ -14,7 +14,7 @@ from common.emulation.spec import LinkSpec
 from common.errors import ConfigurationError, FeelaheadError
 from common.link_model import LinkProfile
 from common.protocol.view_messages import VIEW_NAMES, ViewName
-from feelahead.both_sides.episode_hands import LONGEST_ARMING_S, hands_of, why_not_armed
+from feelahead.both_sides.episode_hands import hands_of, why_not_armed
 from feelahead.both_sides.episode_settings import absolute, law_setting, link_clauses, require_settings, side_settings
 from feelahead.both_sides.history import Contact, History, Sampler
 from feelahead.both_sides.loopback import VIRTUAL_CLOCK, Loopback, Person
@@ -41,6 +41,7 @@ from robot_side.tick import events
 if TYPE_CHECKING:
     from feelahead.both_sides.episode_recording import EpisodeRecording
 
+LONGEST_ARMING_S: Final = 30.0
 _LOOK_S: Final = 0.01
 _DONE_S: Final = 0.05
 
@@ -170,7 +171,7 @@ class Episode:
         hands, until_s = self.loop.person, self.time_s + LONGEST_ARMING_S
         while not self.armed or (isinstance(hands, ArmingHands) and hands.began_s is None):
             if self.time_s >= until_s:
-                raise FeelaheadError(why_not_armed(self.loop, self.settings.link))
+                raise FeelaheadError(why_not_armed(self.loop, self.settings.link, LONGEST_ARMING_S))
             self._advance(self.time_s + _LOOK_S)
         return self
 

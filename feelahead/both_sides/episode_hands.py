@@ -9,7 +9,6 @@ from operator_side.people.settings import PersonSettings
 from operator_side.people.simulated_hands import own_person, simulated_hands
 from operator_side.settings import OperatorSettings
 
-LONGEST_ARMING_S: Final = 30.0
 GRASPING: Final = "grasping"
 """Name of the built-in person, who grasps the target, lifts it and sets it down"""
 
@@ -26,15 +25,15 @@ def hands_of(person: Any, device: SimulatedDualSense, settings: OperatorSettings
     return ArmingHands(device, own_person(person))
 
 
-def why_not_armed(run: Loopback, link: str) -> str:
-    """Return, in words, why the hands do not act: the arm is not armed, or holds nothing yet."""
+def why_not_armed(run: Loopback, link: str, waited_s: float) -> str:
+    """Return, in words, why the hands do not act after `waited_s`: the arm is not armed, or holds nothing yet."""
     robot, hands, now_s = run.robot, run.person, run.clock.now()
     if robot.session.safety.state == "armed":
         gripped = isinstance(hands, ArmingHands) and hands.phase == "grip"
-        return f"the hands {'did not grip' if gripped else 'did not act'} within {LONGEST_ARMING_S:g} s"
+        return f"the hands {'did not grip' if gripped else 'did not act'} within {waited_s:g} s"
     stops = robot.session.safety.stops
     why = f"{stops[-1][1]}; " if stops else ""
     return (
-        f"the robot was not armed within {LONGEST_ARMING_S:g} s over --link {link!r}: {why}loop age"
+        f"the robot was not armed within {waited_s:g} s over --link {link!r}: {why}loop age"
         f" {robot.loop_age_s(now_s):.2f} s, {robot.session.motion_received} commands arrived"
     )
