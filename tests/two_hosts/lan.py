@@ -67,6 +67,10 @@ class Host:
 
 _FOLDERS = (("CONFIG", ".config"), ("CACHE", ".cache"), ("DATA", ".local/share"), ("STATE", ".local/state"))
 
+_SCENES = 4
+_NO_FURTHER_S = 120.0
+"""Time after which the scripted person counts as coming no further, in seconds: a task takes 20 s"""
+
 
 class Side:
     def __init__(self, command: str, host: Host, more: tuple[str, ...] = ()) -> None:
@@ -215,17 +219,24 @@ class Lan:
             yield
 
     def moving(self) -> None:
-        """Wait until the scripted person moves the arm; a person who has finished the task is started again."""
-        for attempt in range(4):
-            status = self.until("operator", "armed and moving", lambda status: is_done(status) or is_moving(status))
-            if is_moving(status):
-                return
-            if attempt < 2:
-                self.end("operator")
-                self.start("operator")
+        """Wait until the scripted person moves the arm."""
+        self.while_driving("armed and moving", is_moving)
+
+    def while_driving(self, what: str, condition: Callable[[Status], bool]) -> None:
+        """Wait until `condition` holds for the operator side's status, while the scripted person does the task.
+
+        A person who has finished, or comes no further as another one left the task half done, begins in a new scene.
+        """
+        for _ in range(_SCENES):
+            try:
+                status = self.until("operator", what, lambda one: is_done(one) or condition(one), _NO_FURTHER_S)
+            except AssertionError as further:
+                print(f"a new scene: {further}")
             else:
-                self.restart()
-        raise AssertionError("the scripted person finished each time before the arm moved")
+                if condition(status):
+                    return
+            self.restart()
+        raise AssertionError(f"{what}: not in {_SCENES} scenes")
 
     def back(self) -> None:
         """Wait until the link is up again; assert that the arm is disarmed then; wait until it is armed again."""
