@@ -121,11 +121,11 @@ class Episode:
         self.device = self._device or SimulatedDualSense()
         self._inputs = FingerInput()
         self._idle = ArmingHands(self.device, Pulling(lambda _: self._inputs))
-        self.hands: Person = self._idle
+        hands: Person = self._idle
         if self.person is not None:
-            self.hands = hands_of(self.person, self.device, self.operator_settings)
+            hands = hands_of(self.person, self.device, self.operator_settings)
         self.loop = Loopback(
-            robot_side, operator, self.device, self.hands, robot, self.operator_settings, self._pages, self._link_spec()
+            robot_side, operator, self.device, hands, robot, self.operator_settings, self._pages, self._link_spec()
         )
 
     def _link_spec(self) -> LinkSpec | None:

@@ -8,7 +8,7 @@ from typing import Final, Protocol, runtime_checkable
 from common.protocol.messages import Telemetry, Vector2
 from operator_side.controller.state import Button
 
-_STICK: Final = ("right", "up")
+_STICK_AXES: Final = ("right", "up")
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ class FingerInput:
                 raise ValueError(f"{name} = {force_n!r}; valid: a force of 0 N or more")
         for name in ("left_stick", "right_stick"):
             stick = getattr(self, name)
-            if len(stick) != len(_STICK) or not all(-1.0 <= part <= 1.0 for part in stick):
+            if len(stick) != len(_STICK_AXES) or not all(-1.0 <= part <= 1.0 for part in stick):
                 raise ValueError(f"{name} = {stick}; valid: right and up, -1 to 1 each")
         if not all(isinstance(button, Button) for button in self.buttons):
             raise ValueError(f"buttons = {self.buttons}; valid: a set of Button")

@@ -1,7 +1,7 @@
 """Whether pictures are lost so often that steps, each of which needs the one before, would show next to nothing.
 
-Where a fifth of the messages is lost, steps freeze a view for 45 % of the time, and pictures that need no other never
-for half a second.
+Where a fifth of the messages is lost, steps let a view stand still for a third of the time and more; pictures that need
+no other hardly do (`tests/robot_side/viewing/test_losses.py`).
 """
 
 import math

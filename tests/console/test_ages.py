@@ -1,5 +1,7 @@
 """Amber, dead, hands off, stop and reset, as the page shows them: the operator side's facts are given."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from itertools import pairwise
 
 import msgspec
@@ -7,8 +9,8 @@ import pytest
 
 from common.status.codes import Doing
 from operator_side.viewing.facts import PictureState
-from tests.console.browser import Browser
-from tests.console.fed_page import AGE, FRESH, fed_page
+from tests.console.browser import Browser, Page
+from tests.console.fed_page import AGE, FRESH, Fed, fed_page
 from tests.console.hands_alone import hands_alone
 from tests.helpers.machines.waiting import wait_until
 
@@ -54,8 +56,9 @@ def test_the_border_says_that_hands_are_off_until_they_count_again(browser: Brow
         page.wait("document.querySelector('#hands_off').hidden", "hands that count")
 
 
-def test_a_page_whose_drawing_is_late_is_heard_by_its_worker_and_says_how_late_it_was(browser: Browser) -> None:
-    blocked = "() => { const end = performance.now() + 2000; while (performance.now() < end); }"
+@contextmanager
+def driving_page(browser: Browser) -> Iterator[tuple[Fed, Page]]:
+    """Yield a page that drives, with hold-to-run held, and what feeds it."""
     with fed_page(browser) as (fed, page):
         fed.page = msgspec.structs.replace(fed.page, driver=None)
         fed.state, fed.status = "disarmed", {"person": Doing.READY}
@@ -63,10 +66,16 @@ def test_a_page_whose_drawing_is_late_is_heard_by_its_worker_and_says_how_late_i
         page.wait_for_text("#hands_state", "Ready")
         with page.held("Space"):
             wait_until("hold-to-run", lambda: fed.hands[-1]["run"])
-            fed.hands.clear()
-            page.ask(blocked)
-            page.wait_for_text("#hands_state", "This page was late by")
-            wait_until("a release", lambda: not fed.hands[-1]["run"])
+            yield fed, page
+
+
+def test_a_page_whose_drawing_is_late_is_heard_by_its_worker_and_says_how_late_it_was(browser: Browser) -> None:
+    blocked = "() => { const end = performance.now() + 2000; while (performance.now() < end); }"
+    with driving_page(browser) as (fed, page):
+        fed.hands.clear()
+        page.ask(blocked)
+        page.wait_for_text("#hands_state", "This page was late by")
+        wait_until("a release", lambda: not fed.hands[-1]["run"])
         repeated = [one for one in fed.hands if one["age_s"] > 0.3]
         assert repeated
         assert all(one["run"] for one in repeated)
@@ -90,15 +99,9 @@ def test_inputs_are_older_by_what_they_waited_for_the_worker(browser: Browser) -
 
 
 def test_a_covered_window_goes_on_and_says_that_nothing_is_drawn(browser: Browser) -> None:
-    with fed_page(browser) as (fed, page):
-        fed.page = msgspec.structs.replace(fed.page, driver=None)
-        fed.state, fed.status = "disarmed", {"person": Doing.READY}
-        page.raw.click("#drive")
-        page.wait_for_text("#hands_state", "Ready")
-        with page.held("Space"):
-            wait_until("hold-to-run", lambda: fed.hands[-1]["run"])
-            page.ask("() => { window.requestAnimationFrame = () => 0; }")
-            page.wait_for_text("#hands_state", "The browser drew nothing of this page for")
+    with driving_page(browser) as (fed, page):
+        page.ask("() => { window.requestAnimationFrame = () => 0; }")
+        page.wait_for_text("#hands_state", "The browser drew nothing of this page for")
         for target in ("mug", "ball"):
             fed.status = {"target": target}
             page.wait_for_text("#target", target)
