@@ -38,6 +38,8 @@ class Fed:
     """Changes to the status"""
     scene: dict[str, Any] = field(default_factory=dict)
     """Changes to the scene's state"""
+    triggers: dict[str, Any] = field(default_factory=dict)
+    """Changes to the facts of both triggers"""
     whose: InputSource = InputSource.BROWSER
     """Whose inputs move the arm"""
     page: HandsFacts = field(default_factory=lambda: HandsFacts(True, "page", False, "", None, yields=(False, True)))
@@ -75,7 +77,8 @@ class Fed:
                 console.view(encode(replace(sways, **self.scene)), video=False)
                 if self.tells:
                     told = {"hands": self.whose, "page": page, "status": status, "pictures": self.pictures}
-                    console.facts(replace(made, **told))
+                    l2, r2 = (replace(trigger, **self.triggers) for trigger in (made.l2, made.r2))
+                    console.facts(replace(made, l2=l2, r2=r2, **told))
                 for view in VIEW_NAMES if self.sends else ():
                     console.view(pictures.frame(view, now_s, step, now_s - self.age_s), video=True)
 

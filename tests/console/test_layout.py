@@ -59,6 +59,9 @@ def test_nothing_overflows(browser: Browser, demo: Run, size: tuple[int, int]) -
 def test_small_windows_cut_nothing_and_keep_stop_and_triggers_in_view(browser: Browser, size: tuple[int, int]) -> None:
     """Also 200 % zoom, 640x360: scrolling and notes move neither stop nor triggers out of it, and all can be read."""
     with fed_page(browser, size) as (fed, page):
+        # The longest words of both triggers: the key that pulls R2 yields (`HandsFacts`).
+        fed.triggers = {"travel": 1.0, "needed_m": -0.999, "course_stiffness": 1.0}
+        page.wait_for_text("#r2 .yields", "pulled 100 %")
         fed.notes = [f"note {number}: something has happened that takes a line or two" for number in range(40)]
         page.wait("document.querySelectorAll('#notes li').length >= 40", "notes")
         for place in ("#overview", "#notes", "#charts", "#terms"):
