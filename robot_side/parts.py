@@ -124,7 +124,7 @@ def build_parts(
     prediction, prediction_note = settings.prediction_for(scene.robot.fingerprint)
     errors = settings.uncertainty(prediction)
     encoder_sigma_rad = np.full(arm.joint_count, encoder.standard_deviation_rad())
-    inputs = LawInputs(errors, encoder_sigma_rad, joint_limits, settings.motion, surroundings)
+    inputs = LawInputs(errors, encoder_sigma_rad, joint_limits, settings.motion, surroundings, settings.paper)
     law = make_law(settings.law if law is None else law, inputs)
     link = settings.seed, settings.asymmetry_s(), settings.tick_period_s()
     late = *prediction_note, *_cover_notes(kinematics.cover, settings.cover_m, held_covers)

@@ -18,6 +18,7 @@ from robot_side.drivers.mujoco.robot_model import SiteAxis
 from robot_side.enlargement.distance import Uncertainty, Vector3
 from robot_side.enlargement.prediction_errors import BUILT_IN, PredictionErrors, load_prediction_errors
 from robot_side.laws.named import require_law
+from robot_side.laws.paper_settings import PaperFlags
 from robot_side.operators.safety import SafetySettings
 from robot_side.viewing.settings import CamerasSettings
 
@@ -64,7 +65,7 @@ class CameraSettings:
 
 
 @dataclass(frozen=True)
-class RobotSettings(SideOptions):
+class RobotSettings(PaperFlags, SideOptions):
     """Robot side: a simulated arm that warns of contact ahead and allows for its own measurement errors.
 
     It listens for an operator side, moves while commands keep coming, and answers with the stiffness of the two
@@ -105,7 +106,8 @@ class RobotSettings(SideOptions):
     reach over. The last three are drawn from the seed."""
     law: Annotated[str, tyro.conf.arg(metavar="NAME|FILE.py")] = "swept"
     """Law from which stiffness follows. swept: stiffness along the direction of each trigger, early enough to release
-    the trigger in time. paper: the paper's plain law, for comparison. FILE.py: a law of your own (docs/python.md)."""
+    the trigger in time. paper: the paper's plain law, for comparison. paper-isotropic: its printed form, with the same
+    stiffness for both triggers. FILE.py: a law of your own (docs/python.md)."""
     assist: Assist = "none"
     """Help besides stiffness, which a strong finger can overcome. speed: the robot side limits the speed along the
     triggers, so that the arm stops where full strength is due, however hard the finger pulls."""

@@ -34,6 +34,7 @@ class Course:
     """Strength of one law at one speed."""
 
     law: str
+    """Name of the law; of the paper's with its settings"""
     speed_m_s: float
     distance_m: FloatArray
     """(n,) way along the approach axis to the first contact"""
@@ -63,6 +64,7 @@ def strength_against_distance(
     across = np.linalg.pinv(pose.tool_jacobian)
     distances_m = np.arange(farthest_m, -0.5 * step_m, -step_m)
     courses, now_s = [], 0.0
+    named = f"{law} ({episode.settings.paper})" if law.startswith("paper") else law
     for speed_m_s in speeds_m_s:
         rates_rad_s = np.ascontiguousarray(across @ np.concatenate([speed_m_s * axis, np.zeros(3)]))
         rendering, travel = TriggerRendering(RenderingSettings(), TravelCalibration()), min(speed_m_s / v_max_m_s, 1.0)
@@ -78,7 +80,7 @@ def strength_against_distance(
             feel = rendering.render(StiffnessUpdate(header, *field, "armed"), (0.0, travel), None, now_s)
             raw = TriggerTravel().raw(travel)
             strengths.append(0 if feel.r2 is None else feel.r2[zone_of(raw)])
-        courses.append(Course(law, speed_m_s, distances_m, np.array(strengths, dtype=float)))
+        courses.append(Course(named, speed_m_s, distances_m, np.array(strengths, dtype=float)))
     return courses
 
 

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final, Literal
 
@@ -23,6 +23,7 @@ from robot_side.drivers.mujoco.ground_truth import GroundTruth
 from robot_side.drivers.mujoco.robot_model import SiteAxis
 from robot_side.drivers.mujoco.true_contact import TrueContact
 from robot_side.laws.inputs import LawInputs
+from robot_side.laws.paper_settings import PaperSettings
 from robot_side.outcome.placing import Placing
 from robot_side.settings import CameraSettings, RobotSettings
 from robot_side.tick.events import Listener
@@ -65,6 +66,8 @@ class Trial:
     site_axis: SiteAxis = "z"
     law: str = "swept"
     """Law of the stiffness, by its name or file; empty: the default"""
+    paper: PaperSettings = field(default_factory=PaperSettings)
+    """Settings of the paper's laws"""
 
 
 class _Silent:
@@ -104,6 +107,8 @@ class Watch(Listener):
             camera=CameraSettings(sd_m=trial.camera_sd_m),
             probability=trial.probability,
             law=trial.law or "swept",
+            law_paper_share=trial.paper.share,
+            enlargement=trial.paper.enlargement,
         )
         operator = OperatorSettings(
             link=trial.link,

@@ -93,6 +93,7 @@ bench = Menu(
         "error": "robot,operator,experiments",
         "coverage": "robot,operator,experiments",
         "felt": "robot,operator,experiments",
+        "front": "robot,operator,experiments",
         "link": "robot,operator",
         "tick": "robot,operator",
         "turn": "robot,operator",

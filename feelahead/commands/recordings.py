@@ -22,6 +22,7 @@ from feelahead.printing.progress import progress
 from feelahead.recordings.comparison import Comparison
 from feelahead.recordings.playback import require_protocol, require_statuses
 from robot_side.laws.named import require_law
+from robot_side.laws.paper_settings import PaperFlags
 
 _Speed = Annotated[float, Meta(gt=0.0, le=1000.0)]
 _BOTH_SIDES = "install it in the clone: pip install '.[robot,operator,record]'"
@@ -71,7 +72,7 @@ class ExportSettings(Limited):
 
 
 @dataclass(frozen=True)
-class PlotSettings:
+class PlotSettings(PaperFlags):
     """Draw a run on one page; or, with --law, the strength of laws against the distance to what is ahead.
 
     Try: feelahead plot --law swept paper ./mine.py --against distance --scene wall --out laws.png
@@ -82,7 +83,8 @@ class PlotSettings:
     out: Path | None = None
     """File to write, which ends in .png, .svg or .pdf; unless given, a .png beside the recording, or distance.png."""
     law: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME|FILE.py...")] = ()
-    """Laws to draw, instead of a recording: swept, paper, or files of your own (docs/python.md)."""
+    """Laws to draw, instead of a recording: swept, paper, paper-isotropic, or files of your own
+    (docs/python.md)."""
     against: Literal["distance"] = "distance"
     """With --law: what the strength under the finger is drawn against."""
     scene: Annotated[Literal["table", "wall", "slot", "shelf"] | None, tyro.conf.arg(metavar="NAME")] = None
@@ -252,13 +254,14 @@ def _plot_laws(settings: PlotSettings) -> int:
     } or {settings.scene or "wall": {"scene": settings.scene or "wall", "seed": settings.seed}}
     speeds_m_s = [1e-3 * speed for speed in settings.speeds]
     loop_age_s = parse_duration(settings.loop_age, "--loop-age")
+    of_paper: dict[str, Any] = {"law_paper_share": settings.law_paper_share, "enlargement": settings.enlargement}
     courses: dict[str, list[Course]] = {}
     with progress("feelahead plot", float(len(places) * len(settings.law))) as shown:
         for name, place in places.items():
             courses[Path(name).stem] = found = []
             for law in settings.law:
                 shown.begin(f"{Path(name).stem}, {law}")
-                found += strength_against_distance(law, speeds_m_s, loop_age_s=loop_age_s, **place)
+                found += strength_against_distance(law, speeds_m_s, loop_age_s=loop_age_s, **place, **of_paper)
                 shown.advance(1.0)
     out = settings.out or Path("distance.png")
     draw_courses(courses, out)

@@ -14,10 +14,11 @@ LAW_COLOURS: Final = {
     "swept": "#0072b2",
     "swept_robot": "#56b4e9",
     "paper": "#d55e00",
+    "paper-isotropic": "#e69f00",
     "none": "#777777",
     "full": "#009e73",
 }
-_OTHER_COLOURS: Final = ("#cc79a7", "#e69f00", "#000000", "#f0e442")
+_OTHER_COLOURS: Final = ("#cc79a7", "#000000", "#f0e442")
 
 
 def colour_of(law: str, laws: Sequence[str]) -> str:

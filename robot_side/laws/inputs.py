@@ -1,6 +1,6 @@
 """What a law is made from, with what most laws need: overlaps, the nearest thing, and a field of one strength."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Final
 
 import numpy as np
@@ -13,6 +13,7 @@ from robot_side.arm.tool_motion import ToolMotionSettings
 from robot_side.enlargement.distance import Uncertainty
 from robot_side.field.object_class import OBSTACLE, SKIPPED
 from robot_side.field.total_overlap import total_overlap_m3
+from robot_side.laws.paper_settings import PaperSettings
 from robot_side.surroundings.surroundings import Surroundings
 from robot_side.tick.sensed import Sensed
 from robot_side.tick.situation import Situation
@@ -32,6 +33,8 @@ class LawInputs:
     motion: ToolMotionSettings
     surroundings: Surroundings
     """Owner of the perceived scene"""
+    paper: PaperSettings = field(default_factory=PaperSettings)
+    """Settings of the paper's own law"""
 
     def overlap_m3(
         self, situation: Situation, inflated_m: float | FloatArray = 0.0, moved_m: FloatArray | None = None

@@ -34,9 +34,19 @@ def _paper(inputs: LawInputs) -> NamedLaw:
     return PaperLaw(inputs)
 
 
-LAWS: Final[Mapping[str, Callable[[LawInputs], NamedLaw]]] = {"swept": _swept, "paper": _paper}
-"""Built-in laws. swept: onset distances along each trigger. paper: the paper's own law (§4.2), one stiffness for both
-triggers."""
+def _paper_isotropic(inputs: LawInputs) -> NamedLaw:
+    from robot_side.laws.paper import PaperLaw  # noqa: PLC0415
+
+    return PaperLaw(inputs, isotropic=True)
+
+
+LAWS: Final[Mapping[str, Callable[[LawInputs], NamedLaw]]] = {
+    "swept": _swept,
+    "paper": _paper,
+    "paper-isotropic": _paper_isotropic,
+}
+"""Built-in laws. swept: onset distances along each trigger. paper: the paper's own law (§4.2), one stiffness for each
+trigger. paper-isotropic: its printed form, with the same stiffness for both."""
 
 
 def make_law(law: object, inputs: LawInputs) -> NamedLaw:

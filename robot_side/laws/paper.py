@@ -1,7 +1,11 @@
 """The paper's own law (§4.2), for comparison. Every sphere is enlarged by D_incr of eq. 10 in all directions.
 
-The stiffness is s = min(1, Σ_ij V_ij / (f Σ_i V_i)) for both triggers and at every travel. V_ij is the overlap of the
-enlarged sphere i with object j, V_i the sphere's volume. D_incr includes the delay (eq. 8).
+The stiffness is s = min(1, V / (f Σ_i V_i)) at every travel. V_i is the volume of the enlarged sphere i, f a setting.
+
+Directed (§2: stiffness "corresponds to the direction of the detected objects"): for R2, V = Σ_ij V_ij max(0, û·n_ij),
+with V_ij the overlap of sphere i with object j, n_ij the unit vector towards it, and û R2's direction; for L2 the same
+with -û. Towards the target, D_incr of a finger's sphere is at most half the gap between the fingers (§3.4).
+Isotropic, as printed: V = Σ_ij V_ij for both triggers, and no limit by the gap. D_incr includes the delay (eq. 8).
 """
 
 import math
@@ -16,26 +20,32 @@ from common.protocol.view_messages import EnlargementTerms
 from robot_side.arm.port import GripperPose
 from robot_side.enlargement.distance import plain_enlargements_m
 from robot_side.enlargement.kinematic_error import position_covariance
+from robot_side.field.object_class import TARGET
+from robot_side.field.total_overlap import overlaps_along
+from robot_side.laws.classes import classes_of
 from robot_side.laws.explanation import moved_and_inflated, overlaps_by_object
 from robot_side.laws.inputs import LawInputs, everything_but_held
 from robot_side.tick.explained import Trigger, TriggerExplained
 from robot_side.tick.sensed import Sensed
 from robot_side.tick.situation import Situation
 
-REFERENCE_SHARE: Final = 0.05
-"""f, the share of the spheres' volume that must overlap for full strength. The paper gives no value. A smaller f gives
-full strength earlier, but also for objects beside and behind."""
 PERIOD_S: Final = 0.01
+_SPHERE: Final = 4.0 / 3.0 * math.pi
 
 
 class PaperLaw:
     """The paper's law. It computes a result every PERIOD_S and returns this result in between."""
 
-    def __init__(self, inputs: LawInputs) -> None:
-        """Take the arm, the errors and the surroundings of a run."""
+    def __init__(self, inputs: LawInputs, *, isotropic: bool = False) -> None:
+        """Take the arm, the errors and the surroundings of a run. isotropic: both triggers alike, as printed."""
         self.looked = 0
+        self.limited = 0
+        """Number of results in which the gap between the fingers has limited D_incr"""
         self._inputs = inputs
         self._uncertainty = inputs.uncertainty
+        self._isotropic = isotropic
+        self._once: tuple[float, EnlargementTerms] | None = None
+        """D_incr that was computed once, with its terms"""
         self._sensed: tuple[float, Sensed] | None = None
 
     def sense(self, situation: Situation, now_s: float) -> Sensed:
@@ -46,7 +56,7 @@ class PaperLaw:
 
     def expect(self, probability: float) -> None:
         """Set the probability P of eq. 10; ConfigurationError outside (0, 1)."""
-        self._uncertainty = replace(self._uncertainty, probability=probability)
+        self._uncertainty, self._once = replace(self._uncertainty, probability=probability), None
 
     def around(self, pose: GripperPose) -> Around | None:
         """Return None: the plain law has no onset distances."""
@@ -54,8 +64,8 @@ class PaperLaw:
         return None
 
     def summary(self) -> dict[str, int]:
-        """Return how often the overlap was computed during the run."""
-        return {"fields": self.looked}
+        """Return how often the overlap was computed during the run, and how often the gap limited D_incr."""
+        return {"fields": self.looked, "limited_by_gap": self.limited}
 
     def explain(self, trigger: Trigger, situation: Situation, sensed: Sensed) -> TriggerExplained:
         """Return the terms of D_incr and the overlaps with each object; both triggers have the same.
@@ -63,12 +73,26 @@ class PaperLaw:
         The terms are those of the sphere with the largest D_incr; its displacement is |v| t_d.
         """
         del trigger, sensed
-        enlargement_m, covariances, velocities = self._enlargements(situation)
-        largest = int(enlargement_m.argmax())
-        displacement_m = float(np.linalg.norm(velocities[largest])) * situation.loop_age_s
-        uncertainty = self._uncertainty
+        by_m, terms = self._enlarged(situation)
+        spheres = moved_and_inflated(situation.pose, np.zeros(3), by_m)
+        table = self._inputs.surroundings.see(situation.objects)
+        return TriggerExplained(terms, overlaps_by_object(spheres, table, everything_but_held(situation)))
+
+    def _enlarged(self, situation: Situation) -> tuple[FloatArray, EnlargementTerms]:
+        """Return D_incr (m,) of the spheres, and the terms of the largest."""
+        jacobians, once = situation.pose.sphere_jacobians, self._inputs.paper.enlargement == "once"
+        if self._once is not None:
+            return np.full(len(jacobians), self._once[0]), self._once[1]
+        velocities_m_s = jacobians @ situation.joint_velocities_rad_s
+        if once:
+            full_speed_m_s = self._inputs.motion.trigger_speed_m_s * situation.pose.tool_rotation[:, 2]
+            velocities_m_s = np.broadcast_to(full_speed_m_s, (len(jacobians), 3))
+        uncertainty, covariances = self._uncertainty, position_covariance(jacobians, self._inputs.encoder_sigma_rad)
+        by_m = plain_enlargements_m(uncertainty, covariances, velocities_m_s, situation.loop_age_s)
+        largest = int(by_m.argmax())
+        displacement_m = float(np.linalg.norm(velocities_m_s[largest])) * situation.loop_age_s
         terms = EnlargementTerms(
-            sigma_m=float(enlargement_m[largest]) - displacement_m,
+            sigma_m=float(by_m[largest]) - displacement_m,
             mean_m=math.hypot(*uncertainty.kinematic_mean_m) + math.hypot(*uncertainty.camera_mean_m),
             kinematic_sd_m=math.sqrt(float(np.trace(covariances[largest]))),
             camera_sd_m=uncertainty.camera_sd_m,
@@ -77,23 +101,29 @@ class PaperLaw:
             loop_age_s=situation.loop_age_s,
             displacement_m=displacement_m,
         )
-        spheres = moved_and_inflated(situation.pose, np.zeros(3), enlargement_m)
-        table = self._inputs.surroundings.see(situation.objects)
-        return TriggerExplained(terms, overlaps_by_object(spheres, table, everything_but_held(situation)))
-
-    def _enlargements(self, situation: Situation) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return D_incr (m,), position covariances (m, 3, 3) and velocities (m, 3) of the spheres."""
-        jacobians = situation.pose.sphere_jacobians
-        covariances = position_covariance(jacobians, self._inputs.encoder_sigma_rad)
-        velocities_m_s = jacobians @ situation.joint_velocities_rad_s
-        enlargements_m = plain_enlargements_m(self._uncertainty, covariances, velocities_m_s, situation.loop_age_s)
-        return enlargements_m, covariances, velocities_m_s
+        if once and situation.loop_age_settled:
+            self._once = float(by_m[largest]), terms
+        return by_m, terms
 
     def _look(self, situation: Situation) -> Sensed:
         self.looked += 1
-        enlargement_m, _, _ = self._enlargements(situation)
-        overlap_m3 = self._inputs.overlap_m3(situation, enlargement_m)
-        radii_m = situation.pose.sphere_radii_m + enlargement_m
-        stiffness = min(1.0, overlap_m3 / (REFERENCE_SHARE * 4.0 / 3.0 * np.pi * float((radii_m**3).sum())))
-        figures = {"enlargement_m": float(enlargement_m.max()), "overlap_m3": overlap_m3}
-        return self._inputs.sensed(situation, l2=stiffness, r2=stiffness, **figures)
+        by_m, _ = self._enlarged(situation)
+        pose, inputs = situation.pose, self._inputs
+        radii_m = pose.sphere_radii_m + by_m
+        figures = {"enlargement_m": float(by_m.max())}
+        full_m3 = inputs.paper.share * _SPHERE * float((radii_m**3).sum())
+        if self._isotropic:
+            overlap_m3 = inputs.overlap_m3(situation, by_m)
+            stiffness = min(1.0, overlap_m3 / full_m3)
+            return inputs.sensed(situation, l2=stiffness, r2=stiffness, overlap_m3=overlap_m3, **figures)
+        to_target_m = radii_m
+        if situation.gap_m is not None:
+            widest_m = 0.5 * max(situation.gap_m, 0.0)
+            to_target_m = np.where(pose.sphere_on_finger, pose.sphere_radii_m + np.minimum(by_m, widest_m), radii_m)
+        spheres = moved_and_inflated(pose, np.zeros(3), by_m)
+        classes = classes_of(situation.objects, situation.held).usual
+        self.limited += int((to_target_m < radii_m).any() and (classes == TARGET).any())
+        table = inputs.surroundings.see(situation.objects)
+        found = overlaps_along(spheres, to_target_m, pose.tool_rotation[:, 2], table, classes)
+        l2, r2 = (min(1.0, overlap_m3 / full_m3) for overlap_m3 in (found.behind_m3, found.ahead_m3))
+        return inputs.sensed(situation, l2=l2, r2=r2, overlap_m3=found.all_m3, **figures)

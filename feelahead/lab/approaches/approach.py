@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
 
@@ -24,6 +24,7 @@ from operator_side.settings import OperatorSettings
 from robot_side.compiled.warm_up import import_kernels, warm_up
 from robot_side.drivers.mujoco.robot_model import SiteAxis
 from robot_side.drivers.mujoco.true_contact import TrueContact
+from robot_side.laws.paper_settings import PaperSettings
 from robot_side.settings import Assist, CameraSettings, RobotSettings
 from robot_side.tick.events import Listener
 from robot_side.tick.truth import ContactOnset
@@ -59,6 +60,8 @@ class Approach:
     link: str = ""
     link_model: LinkModel = "datagram"
     law: TriedLaw = "swept"
+    paper: PaperSettings = field(default_factory=PaperSettings)
+    """Settings of the paper's laws"""
     probability: float = 0.99
     duration_s: float = 8.0
     """Time from the beginning of the pull to the end of the run."""
@@ -168,6 +171,8 @@ def robot_settings(approach: Approach) -> RobotSettings:
         seed=approach.seed,
         probability=approach.probability,
         law=law_of_robot(approach.law),
+        law_paper_share=approach.paper.share,
+        enlargement=approach.paper.enlargement,
         assist=approach.assist,
         full_rate=approach.full_rate,
         tick_period=approach.tick_period,

@@ -18,7 +18,7 @@ from common.arrays import FloatArray
 from common.reaction import REACTION_S
 from feelahead.lab.approaches.frozen import PASSED, SITE, frozen_scene
 from feelahead.lab.approaches.judging import false_alarms, strength_before_release
-from feelahead.lab.approaches.laws import TriedLaw
+from feelahead.lab.approaches.laws import TriedLaw, paper_figures, with_papers
 from feelahead.lab.approaches.placements import Collision, first_touch_s, place
 from feelahead.lab.approaches.pulls import PullKind
 from feelahead.lab.approaches.recording import record_approach
@@ -29,6 +29,7 @@ from operator_side.controller.feel import MAX_STRENGTH
 from robot_side.drivers.mujoco.camera import CameraError
 from robot_side.drivers.mujoco.posed_scene import PosedScene
 from robot_side.drivers.mujoco.scene import Scene, load_scene
+from robot_side.laws.paper_settings import PaperSettings
 from robot_side.settings import EncoderSettings
 
 LINKS: Final = {
@@ -83,6 +84,8 @@ class Pulls:
     """Number of approaches, and of object placements for each."""
     probabilities: tuple[float, ...]
     laws: tuple[TriedLaw, ...]
+    papers: tuple[PaperSettings, ...] = (PaperSettings(),)
+    """Settings with each of which the paper's laws are judged"""
     judged_s: float = 60.0
     """Seconds with R2 pulled, at least, in which false alarms are counted for each cell."""
 
@@ -144,13 +147,14 @@ def evaluate(pulls: Pulls, seed: int) -> Iterator[Row]:
         encoder = EncoderSettings(sigma_rad=cell.encoder_factor * EncoderSettings().sigma_rad)
         staged = [_stage(cell, Replay(record, scene, encoder, record.seed), places) for record in records]
         for probability in pulls.probabilities:
-            for name in pulls.laws:
-                counts, law = _Counts(), Judged(name, probability)
+            for name, paper in with_papers(pulls.laws, pulls.papers):
+                counts, law = _Counts(), Judged(name, probability, paper or PaperSettings())
                 _count_covered(counts, law, cell, staged)
                 _count_alarms(counts, law, cell, staged, pulls.judged_s)
                 row: Row = {"cell": cell.key(pulls.pull, pulls.link), "scene": cell.shown}
                 row |= {"camera_mm": cell.camera_mm, "encoder_factor": cell.encoder_factor}
-                yield row | {"law": name, "probability": probability} | _figures(counts, staged, probability)
+                row |= {"law": name, "probability": probability, **paper_figures(paper)}
+                yield row | _figures(counts, staged, probability)
 
 
 @cache

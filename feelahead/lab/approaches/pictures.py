@@ -10,6 +10,7 @@ from feelahead.lab.approaches.laws import TriedLaw, in_words, with_compensation
 from feelahead.lab.approaches.links import mean_loop_s
 from feelahead.lab.figures import colour_of, figure
 from feelahead.lab.table import Row, Table
+from robot_side.laws.paper_settings import PaperSettings
 
 _LARGEST_MARK, _SMALLER = 10.0, 2.0
 """Size of the first law's marks, and by how much each next law's are smaller, so that none hides another"""
@@ -22,9 +23,7 @@ def draw_run(table: Table, frozen: str, path: Path) -> None:
     trace = row["trace"]
     end_s = max(trace["time_s"][-1], 0.01) if trace["time_s"] else 0.01
     link = row["link"] or "no delay"
-    title = (
-        f"{row['force_n']:g} N in {Path(row['model']).stem}, law {in_words(law_of_row(row))}, {link} (frozen {frozen})"
-    )
+    title = f"{row['force_n']:g} N in {Path(row['model']).stem}, law {words_of_row(row)}, {link} (frozen {frozen})"
     with figure(path, 2, 1, title, figsize=(8.0, 5.6), sharex=True) as (drawn, (zones, motion)):
         shades: dict[str, Any] = {"cmap": "Greys", "vmin": 0, "vmax": 8, "interpolation": "nearest"}
         strengths = list(zip(*trace["strengths"], strict=True)) or [(0,)]
@@ -50,7 +49,8 @@ def draw_comparison(table: Table, frozen: str, path: Path) -> None:
     """
     forces = sorted(set(table.values("force_n")))
     names = scene_names(map(Path, table.values("model")))
-    laws = list(dict.fromkeys(law_of_row(row) for row in table))
+    words = {law_of_row(row): words_of_row(row) for row in table}
+    laws = list(words)
     delays_ms = {_delay_ms(row) for row in table}
     options: dict[str, Any] = {"figsize": (4.2 * len(forces) + 1.6, 4.2), "sharey": True, "squeeze": False}
     with figure(path, 1, len(forces), f"frozen {frozen}", **options) as (drawn, panels):
@@ -67,11 +67,11 @@ def draw_comparison(table: Table, frozen: str, path: Path) -> None:
                     markersize=max(_SMALLER, _LARGEST_MARK - _SMALLER * place),
                     color=colour_of(law, laws),
                     alpha=0.7,
-                    label=f"{in_words(law)}, {names[scene]}" if force_n == forces[0] else None,
+                    label=f"{words[law]}, {names[scene]}" if force_n == forces[0] else None,
                 )
             panel.set(title=f"{force_n:g} N", xlabel="delay each way, ms")
             if len(delays_ms) == 1:
-                panel.set_xticks(range(len(laws)), map(in_words, laws))
+                panel.set_xticks(range(len(laws)), words.values())
                 panel.set(xlim=(-0.5, len(laws) - 0.5), xlabel=f"law, at {min(delays_ms):g} ms each way")
             panel.grid(alpha=0.3)
         panels[0][0].set(ylim=(-5.0, None), ylabel="speed at contact, mm/s (0: no contact)")
@@ -80,6 +80,12 @@ def draw_comparison(table: Table, frozen: str, path: Path) -> None:
 
 def _delay_ms(row: Row) -> float:
     return 500.0 * mean_loop_s(row["link"], row["link_model"])
+
+
+def words_of_row(row: Row) -> str:
+    """Return the law of a run as it is printed; the paper's with its settings."""
+    law = in_words(law_of_row(row))
+    return law if row["share"] is None else f"{law} ({PaperSettings(row['share'], row['enlargement'])})"
 
 
 def law_of_row(row: Row) -> TriedLaw:

@@ -1,7 +1,7 @@
 """Compute the strengths that a law gives to the triggers' zones at given times of a recorded approach."""
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cache
 from typing import Final
 
@@ -23,6 +23,7 @@ from robot_side.enlargement.prediction_errors import BUILT_IN, PredictionErrors,
 from robot_side.laws.inputs import LawInputs
 from robot_side.laws.law import Law
 from robot_side.laws.named import make_law
+from robot_side.laws.paper_settings import PaperSettings
 from robot_side.laws.swept import SweptLaw
 from robot_side.surroundings.perceived import PerceivedObjects, displaced
 from robot_side.surroundings.surroundings import Surroundings
@@ -69,6 +70,8 @@ class Judged:
 
     law: TriedLaw
     probability: float
+    paper: PaperSettings = field(default_factory=PaperSettings)
+    """Settings of the paper's laws"""
 
     def strengths(self, draw: Draw, times_s: FloatArray) -> IntArray:
         """Return the strengths (t, 2, 10), 0 to 8, of L2's and R2's zones at the operator side's rising times (t,)."""
@@ -102,7 +105,7 @@ class Judged:
         replay = draw.replay
         uncertainty = Uncertainty(self.probability, camera_sd_m=draw.camera_sd_m, prediction=_prediction_errors())
         limits = MotionLimits().of_joints(replay.joints)
-        inputs = LawInputs(uncertainty, replay.encoder_sigma_rad, limits, replay.motion, Surroundings())
+        inputs = LawInputs(uncertainty, replay.encoder_sigma_rad, limits, replay.motion, Surroundings(), self.paper)
         if self.law == "swept_robot":
             return SweptLaw(inputs)
         return make_law(law_of_robot(self.law), inputs)

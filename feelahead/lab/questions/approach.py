@@ -27,18 +27,20 @@ from feelahead.lab.approaches.frozen import AHEAD, ASIDE, GRIPPED, SCENES, SITE,
 from feelahead.lab.approaches.laws import (
     TriedLaw,
     compensation_of,
-    in_words,
+    is_paper,
+    paper_figures,
     require_tried,
     with_compensation,
     without_compensation,
 )
 from feelahead.lab.approaches.links import require_young_loop
 from feelahead.lab.approaches.outcome import Outcome
-from feelahead.lab.approaches.pictures import draw_comparison, draw_run, law_of_row
+from feelahead.lab.approaches.pictures import draw_comparison, draw_run, law_of_row, words_of_row
 from feelahead.lab.sweep import Question, Sweep
 from feelahead.lab.table import Row, Table
 from feelahead.printing.figures import shown
 from robot_side.drivers.mujoco.robot_model import SiteAxis
+from robot_side.laws.paper_settings import PaperFlags
 from robot_side.settings import Assist
 
 _QUICK: Final = ("wall", "edge")
@@ -48,7 +50,7 @@ _Force = Annotated[float, Meta(ge=0.0, le=20.0)]
 
 
 @dataclass(frozen=True)
-class ApproachSettings(Sweep):
+class ApproachSettings(PaperFlags, Sweep):
     """Press R2 with a finger of constant force until the gripper touches something or comes to rest.
 
     Both sides run in virtual time with the real messages, link, trigger effects and physics. Without --model, every
@@ -72,11 +74,11 @@ class ApproachSettings(Sweep):
     link_model: LinkModel = "datagram"
     """datagram: messages may be lost and reordered. stream: messages stay in order and losses delay them."""
     law: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME|FILE.py...")] = ("swept",)
-    """Laws to compare. swept: objects ahead along the trigger. paper: the paper's printed law. none: no haptics. full:
-    always the strongest effect. FILE.py: a law of your own (docs/python.md)."""
+    """Laws to compare. swept: objects ahead along the trigger. paper: the paper's law. paper-isotropic: as it
+    is printed. none: no haptics. full: always the strongest effect. FILE.py: a law of your own (docs/python.md)."""
     compensation: tuple[Compensation, ...] = ("operator",)
     """Side that compensates the delay. operator: by the commands under way. robot: by speed times loop age (v t_d,
-    eq. 8), as the law `paper` always does."""
+    eq. 8), as the paper's laws always do."""
     haptics: bool = True
     """Whether the law is felt; --no-haptics is the same as --law none."""
     probability: Annotated[float, Meta(gt=0.0, lt=1.0), tyro.conf.arg(metavar="P")] = 0.99
@@ -104,7 +106,7 @@ class ApproachSettings(Sweep):
         for name in ("force", "strongest_effect", "link", "compensation"):
             if not getattr(self, name):
                 raise ValueError(f"--{name.replace('_', '-')}: no value is given; valid: one value or more")
-        require_tried(self.law, "law", ("swept", "paper", "none", "full"))
+        require_tried(self.law, "law", ("swept", "paper", "paper-isotropic", "none", "full"))
         for name in ("stick", "turn"):
             if not math.hypot(*getattr(self, name)) <= 1.0 + 1e-9:  # false for NaN, too
                 raise ValueError(
@@ -146,6 +148,7 @@ def cells(settings: ApproachSettings) -> Iterator[Approach]:
             link=link,
             link_model=settings.link_model,
             law=law,
+            paper=settings.paper,
             probability=settings.probability,
             duration_s=settings.duration,
             grip=settings.grip or (frozen and model.stem in GRIPPED),
@@ -170,6 +173,7 @@ def figures(approach: Approach, outcome: Outcome) -> Row:
         "law": without_compensation(approach.law),
         "compensation": compensation_of(approach.law),
         "haptics": approach.law != "none",
+        **paper_figures(approach.paper if is_paper(approach.law) else None),
         "stick": approach.stick,
         "turn": approach.turn,
         **vars(outcome),
@@ -185,7 +189,7 @@ def show(_: ApproachSettings, table: Table) -> Iterator[RenderableType]:
 
 def sentence(row: Row) -> str:
     """Describe in a line or two how one run ended."""
-    what = f"{row['force_n']:g} N in {Path(row['model']).stem}, law {in_words(law_of_row(row))}: "
+    what = f"{row['force_n']:g} N in {Path(row['model']).stem}, law {words_of_row(row)}: "
     if row["why"] is not None:
         return f"{what}{row['end']}: {row['why']}"
     if row["contact_speed_mm_s"] is not None:
@@ -202,7 +206,7 @@ def sentence(row: Row) -> str:
 
 def comparison(table: Table) -> Shown:
     """Return a table with a row for each scene, link and force, and a column for each law, over all seeds."""
-    laws = list(dict.fromkeys(law_of_row(row) for row in table))
+    laws = {law_of_row(row): words_of_row(row) for row in table}
     names = scene_names(map(Path, table.values("model")))
     entries = [
         (
@@ -212,7 +216,7 @@ def comparison(table: Table) -> Shown:
         for (model, link, force_n, strongest_n), rows in table.groups("model", "link", "force_n", "strongest_n")
     ]
     title = "contacts of runs, median mm/s [least to greatest]; mm off where it stopped; ? undecided; R most reversals"
-    return shown(title, ("scene", "link", "N", "effect, N", *map(in_words, laws)), entries)
+    return shown(title, ("scene", "link", "N", "effect, N", *laws.values()), entries)
 
 
 def draw(settings: ApproachSettings, table: Table, path: Path) -> None:

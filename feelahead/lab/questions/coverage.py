@@ -17,15 +17,17 @@ from rich.table import Table as Shown
 from feelahead.lab.approaches.approach import compile_kernels
 from feelahead.lab.approaches.evaluation import LINKS, Placement, Pulls, evaluate
 from feelahead.lab.approaches.frozen import AHEAD, PASSED, frozen_hash
-from feelahead.lab.approaches.laws import LAWS, TriedLaw, require_tried
+from feelahead.lab.approaches.laws import TriedLaw, is_paper, require_tried
 from feelahead.lab.approaches.pulls import PULL_KINDS, PullKind
 from feelahead.lab.figures import colour_of, figure
 from feelahead.lab.sweep import Question, Sweep
 from feelahead.lab.table import Row, Table
 from feelahead.printing.figures import shown
+from robot_side.laws.paper_settings import PaperFlags
 
 HOMES: Final = {"u_mesh": "mug", "mug": "mug"}
 """Scenes whose home pose differs from that of `empty`, with the scene in which their approaches are recorded."""
+COMPARED: Final = ("swept", "swept_robot", "paper", "none", "full")
 _NOT_STILL: Final = ("moving", "fleeing", "place_held", "terrain_ahead")
 """Scenes that only `try approach` uses: objects that move by themselves or with the gripper, and a hill."""
 QUICK_SIZES: Final = (10, 4)
@@ -39,7 +41,7 @@ _Probability = Annotated[float, Meta(gt=0.0, le=0.9999)]
 
 
 @dataclass(frozen=True)
-class CoverageSettings(Sweep):
+class CoverageSettings(PaperFlags, Sweep):
     """Measure the share of approaches with full strength in time, and false alarms, for each law.
 
     Covered: full strength came in time. That is, 0.25 s before the last release that avoids the contact, the farthest
@@ -50,9 +52,9 @@ class CoverageSettings(Sweep):
     --quick: a few cells in three minutes, instead of all in two hours.
     """
 
-    laws: Annotated[tuple[TriedLaw, ...], tyro.conf.arg(metavar="NAME|FILE.py...")] = LAWS
-    """Laws to compare: swept, swept_robot (the robot side compensates the delay), paper, none, full (always the
-    strongest effect), or files of your own."""
+    laws: Annotated[tuple[TriedLaw, ...], tyro.conf.arg(metavar="NAME|FILE.py...")] = COMPARED
+    """Laws to compare: swept, swept_robot (the robot side compensates the delay), paper, paper-isotropic (as it
+    is printed), none, full (always the strongest effect), or files of your own."""
     probabilities: Annotated[tuple[_Probability, ...], tyro.conf.arg(metavar="P...")] = ()
     """Judge only these P, instead of those planned for each cell; each takes n >= 10/(1 - P) draws for each cell."""
     only: Annotated[tuple[str, ...], tyro.conf.arg(metavar="TEXT...")] = ()
@@ -81,7 +83,7 @@ class CoverageSettings(Sweep):
         of_kind = Counter((pull, link) for (pull, link, _), cells in found.items() for _ in cells)
         motions = [
             Pulls(
-                *(pull, link, home, tuple(cells), sizes, chosen, self.laws),
+                *(pull, link, home, tuple(cells), sizes, chosen, self.laws, (self.paper,)),
                 judged_s=judged_s / of_kind[pull, link],
             )
             for (pull, link, home), cells in found.items()
@@ -139,6 +141,8 @@ def show(settings: CoverageSettings, table: Table) -> Iterator[RenderableType]:
     yield "sticks move once more, so that nobody can know / that were not found"
     yield from (by_pull(found, law) for law in settings.laws)
     yield by_law(table, settings.laws)
+    if any(map(is_paper, settings.laws)):
+        yield f"paper: {settings.paper}"
 
 
 def judged(table: Table) -> Table:
@@ -244,7 +248,8 @@ def draw(settings: CoverageSettings, table: Table, path: Path) -> None:
         axes.set_xlim(-0.02, 200.0)
         axes.grid(alpha=0.3)
         axes.legend(loc="center", fontsize=8)
-        axes.set_title(f"all cells together (frozen {frozen_hash()})", fontsize=9)
+        of_paper = f"; paper: {settings.paper}" if any(map(is_paper, settings.laws)) else ""
+        axes.set_title(f"all cells together (frozen {frozen_hash()}{of_paper})", fontsize=9)
 
 
 QUESTION = Question(

@@ -18,7 +18,7 @@ from rich.table import Table as Shown
 
 from common.emulation.clauses import LinkModel
 from feelahead.both_sides.grasping_trial import MISJUDGES_DEPTH, Arm, Trial, run_trial
-from feelahead.lab.approaches.laws import require_tried
+from feelahead.lab.approaches.laws import is_paper, require_tried
 from feelahead.lab.intervals import mcnemar_p, mean_interval, share_interval
 from feelahead.lab.sweep import Question, Sweep
 from feelahead.lab.table import Row, Table
@@ -26,6 +26,7 @@ from feelahead.printing.figures import shown
 from operator_side.people.settings import PersonSettings
 from robot_side.drivers.mujoco.built_in_scenes import SceneName
 from robot_side.laws.named import LAWS
+from robot_side.laws.paper_settings import PaperFlags
 
 _ARMS: dict[Arm, str] = {"off": "off", "mechanical": "on, no notice taken", "reacting": "on, reacts"}
 _NO_LAW = ""
@@ -39,7 +40,7 @@ _Delay = Annotated[float, Meta(ge=0.0, lt=1000.0)]
 
 
 @dataclass(frozen=True)
-class HapticsSettings(Sweep):
+class HapticsSettings(PaperFlags, Sweep):
     """Compare a simulated person's trials without haptics, with ignored haptics, and with haptics they react to.
 
     The person misjudges distances and sees no obstacle. They reach for the target in single moves, grasp it, lift it
@@ -49,7 +50,7 @@ class HapticsSettings(Sweep):
     seeds: Annotated[int, Meta(ge=1), tyro.conf.arg(metavar="N")] = 30
     """Number of seeds; each gives one trial for each condition."""
     law: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME|FILE.py...")] = ("swept",)
-    """Laws to compare: swept, paper, or files of your own (docs/python.md)."""
+    """Laws to compare: swept, paper, paper-isotropic, or files of your own (docs/python.md)."""
     scenes: tuple[SceneName, ...] = ("wall", "slot", "shelf")
     """Scenes. wall: a wall behind the target. slot: two posts on the way. shelf: a raised edge on the way. table:
     clutter beside the way."""
@@ -108,6 +109,7 @@ def cells(settings: HapticsSettings) -> Iterator[Cell]:
                 camera_sd_m=1e-3 * settings.camera_mm,
                 probability=settings.probability,
                 law=law,
+                paper=settings.paper,
             ),
         )
 
@@ -129,7 +131,9 @@ def show(settings: HapticsSettings, table: Table) -> Iterator[Shown]:
         headings = ("haptics", *hits, "felt first", "R2 full", "finished, s", "longer by [95 %]")
         entries = []
         for arm, law in _conditions(settings):
-            words = _ARMS[arm] if len(settings.law) == 1 or not law else f"{law}: {_ARMS[arm]}"
+            words = f"{law} ({settings.paper}): {_ARMS[arm]}" if is_paper(law) else _ARMS[arm]
+            if len(settings.law) > 1 and law and not is_paper(law):
+                words = f"{law}: {words}"
             entries.append((words, *_figures(pairs, arm, law, settings.duration)))
         yield shown(title, headings, entries)
 

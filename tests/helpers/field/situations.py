@@ -14,6 +14,7 @@ from robot_side.enlargement.prediction_errors import PredictionErrors
 from robot_side.laws.inputs import LawInputs
 from robot_side.laws.law import Law
 from robot_side.laws.paper import PaperLaw
+from robot_side.laws.paper_settings import PaperSettings
 from robot_side.laws.swept import SweptLaw
 from robot_side.surroundings.perceived import PerceivedObjects
 from robot_side.surroundings.surroundings import Surroundings
@@ -45,8 +46,16 @@ def swept(encoder_sigma_rad: float = 0.0, *, maps: bool = False, **changes: Any)
     return SweptLaw(inputs(encoder_sigma_rad, **changes), maps=maps)
 
 
-def paper(encoder_sigma_rad: float = 0.0, **changes: Any) -> PaperLaw:
-    return PaperLaw(inputs(encoder_sigma_rad, **changes))
+def paper(
+    encoder_sigma_rad: float = 0.0,
+    settings: PaperSettings | None = None,
+    *,
+    isotropic: bool = False,
+    **changes: Any,
+) -> PaperLaw:
+    return PaperLaw(
+        replace(inputs(encoder_sigma_rad, **changes), paper=settings or PaperSettings()), isotropic=isotropic
+    )
 
 
 def situation(pose: GripperPose, objects: PerceivedObjects | None = None, **changes: Any) -> Situation:
