@@ -13,7 +13,7 @@ export PYTHONDONTWRITEBYTECODE :=
 
 # A file that is only half made is made again.
 .DELETE_ON_ERROR:
-.PHONY: audit figures demo mutants sbom test quick types test-kernel test-two-hosts wide-area test-containers test-console test-quiet soak pictures notebook driving latency-experiment lock clean
+.PHONY: audit figures demo mutants sbom test quick types test-kernel test-two-hosts wide-area test-containers test-console test-quiet soak paper pictures notebook driving latency-experiment lock clean
 
 PIP = $(BIN)/python -m pip install --disable-pip-version-check
 PIP_LOG = $(VENV)/pip.log
@@ -95,6 +95,9 @@ test-quiet: $(VENV)/.installed $(VENV)/.kernels ## what is judged by millisecond
 # Needs Chromium, and a machine with nothing else to do: its runs are real ones.
 pictures: $(VENV)/.installed $(VENV)/.kernels ## the documents' pictures of console and terminal view, made anew
 	$(BIN)/python -m tests.console.pictures $(ARGS)
+
+paper: $(VENV)/.installed $(VENV)/.kernels ## figures 1 to 5 of the paper from this system: make paper ARGS="--only 2 --out FOLDER"
+	$(BIN)/python -m feelahead.lab.paper_figures $(ARGS)
 
 notebook: $(VENV)/.installed $(VENV)/.kernels ## examples/first_episode.ipynb from tests/examples/first_episode.md, executed anew
 	$(BIN)/python -m tests.examples.notebook

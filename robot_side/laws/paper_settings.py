@@ -8,7 +8,7 @@ from msgspec import Meta
 
 EnlargementTime = Literal["always", "once"]
 Share = Annotated[float, Meta(gt=0.0, le=1.0)]
-BEST_SHARE: Final = 0.0005
+BEST_SHARE: Final = 2e-5
 """f that prevents most contacts for the fewest false alarms, as chosen by: feelahead bench front"""
 
 
