@@ -3,21 +3,30 @@
 A scene without meshes does not load this module.
 """
 
+import math
 from typing import Final, NamedTuple
 
 import numpy as np
 
 from common.arrays import BoolArray, FloatArray, IntArray
 from robot_side.compiled.columns import FLAGS, INDICES, NUMBERS, Declared, matrices, rows
-from robot_side.compiled.kernel import FLOAT64, compiled, inlined
+from robot_side.compiled.kernel import FLOAT64, INT64, compiled, inlined
 from robot_side.compiled.vectors import Vector, dot, load, subtract
 from robot_side.overlap.meshes.mesh_kernels import to_world
 from robot_side.overlap.meshes.mesh_tables import FIELDS, MeshTables
 from robot_side.overlap.meshes.rounded_overlap import rounded_overlap
 from robot_side.overlap.meshes.tree_queries import is_clear_of
 from robot_side.overlap.meshes.triangle_lanes import SCRATCH
-from robot_side.surroundings.kinds.layout import CONTACT, LEAST_CONTACT_M, MESH_CONTACT, NEVER, OVERLAP, Contact
-from robot_side.surroundings.kinds.mesh_contact import closing_at, next_touch, overlaps, swept
+from robot_side.surroundings.kinds.layout import (
+    CONTACT,
+    CROSSINGS,
+    LEAST_CONTACT_M,
+    MESH_CONTACT,
+    NEVER,
+    OVERLAP,
+    Contact,
+)
+from robot_side.surroundings.kinds.mesh_contact import closing_at, crossings_of, next_touch, overlaps, swept
 from robot_side.surroundings.perceived import PerceivedObjects
 
 
@@ -65,6 +74,7 @@ class PlacedMeshes:
         self.near, self.scratch = np.empty(len(self.triangles) + 1, np.int64), np.empty(SCRATCH)
         self.bundle = MESHES.bundle(self)
         self.overlap, self.contact = overlap_one_mesh.address, contact_with_mesh.address
+        self.crossings = crossings_of_mesh.address
 
 
 @inlined
@@ -134,3 +144,29 @@ def contact_with_mesh(
         return NEVER
     found = max(found, 0.0 if inside else LEAST_CONTACT_M)
     return found, closing_at(tables, triangle, sweep, found) if meshes.convex[mesh] else 0.0
+
+
+@compiled(*CROSSINGS, returns=INT64)
+def crossings_of_mesh(
+    bundle: IntArray,
+    row: int,
+    x: float,
+    y: float,
+    z: float,
+    u: float,
+    v: float,
+    w: float,
+    crossings: FloatArray,
+    count: int,
+) -> int:
+    """Append where the line from (x, y, z) along (u, v, w) enters and leaves the mesh in `row`; return the new count.
+
+    crossings (n, 2): distance, and 1 where the line enters or -1 where it leaves; the first `count` are there already.
+    What finds no room is left out.
+    """
+    meshes = _at(bundle)
+    tables, place = _tables(meshes), meshes.rows[row]
+    rotation, mesh = meshes.rotations[place], meshes.mesh[place]
+    start = _turned_back(rotation, subtract((x, y, z), load(meshes.positions, place)))
+    along = _turned_back(rotation, (u, v, w))
+    return crossings_of(tables, mesh, swept(start, along, 0.0, math.inf), crossings, count)

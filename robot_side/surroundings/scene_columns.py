@@ -5,12 +5,12 @@ from typing import Final, NamedTuple
 from common.arrays import FloatArray, IntArray
 from robot_side.compiled.calls import call_at_address
 from robot_side.compiled.columns import BUNDLED, INDICES, NUMBERS, Declared, rows
-from robot_side.compiled.kernel import inlined
+from robot_side.compiled.kernel import INT64, inlined
 from robot_side.compiled.vectors import Vector
-from robot_side.surroundings.any_kind import contact
+from robot_side.surroundings.any_kind import chord, contact
 from robot_side.surroundings.blocks import TOGETHER
 from robot_side.surroundings.bounds import passes
-from robot_side.surroundings.kinds.layout import CONTACT, MESH, MESH_CONTACT, SHAPE_NUMBERS, Contact
+from robot_side.surroundings.kinds.layout import CONTACT, CROSSINGS, MESH, MESH_CONTACT, SHAPE_NUMBERS, Contact
 
 
 class SceneColumns(NamedTuple):
@@ -35,7 +35,7 @@ SCENE: Final = Declared(
     *(rows(4), rows(SHAPE_NUMBERS), INDICES, INDICES, rows(4), NUMBERS),
     *(INDICES, rows(4), rows(4), rows(4), INDICES, BUNDLED),
 )
-_mesh_contact = call_at_address(MESH_CONTACT, CONTACT)
+_mesh_contact, _mesh_crossings = call_at_address(MESH_CONTACT, CONTACT), call_at_address(INT64, CROSSINGS)
 
 
 @inlined
@@ -60,6 +60,21 @@ def contact_with(
         # So far the contact is the one with the box around the mesh.
         found, closing = _mesh_contact(scene.kernels[-1], (scene.meshes, row, *start, *along, radius, reach, clear))
     return found, closing
+
+
+@inlined
+def add_crossings(
+    scene: SceneColumns, row: int, start: Vector, along: Vector, crossings: FloatArray, count: int
+) -> int:
+    """Append where a line enters and leaves the primitive in `row`, as `crossings_of_mesh` does; return the count."""
+    enter, leave = chord(scene.kinds[row], scene.shapes, row, start, along)
+    if not enter < leave or count + 2 > crossings.shape[0]:
+        return count
+    if scene.kinds[row] == MESH:
+        return int(_mesh_crossings(scene.kernels[-2], (scene.meshes, row, *start, *along, crossings, count)))
+    crossings[count, 0], crossings[count, 1] = enter, 1.0
+    crossings[count + 1, 0], crossings[count + 1, 1] = leave, -1.0
+    return count + 2
 
 
 @inlined

@@ -70,13 +70,13 @@ class SceneTable:
 
     @cached_property
     def kernels(self) -> IntArray:
-        """Address of each kind's overlap kernel, then of the meshes' contact kernel; 0 for a kernel not needed"""
-        found = np.zeros(len(KINDS) + 1, dtype=np.int64)
+        """Address of each kind's overlap kernel, then those of meshes: crossings, contact; 0 for a kernel not needed"""
+        found = np.zeros(len(KINDS) + 2, dtype=np.int64)
         for number, kind in enumerate(KINDS):
             if kind.kernel is not None and (self.kinds == number).any():
                 found[number] = kind.kernel.address
         if self.placed is not None:
-            found[MESH], found[-1] = self.placed.overlap, self.placed.contact
+            found[MESH], found[-2:] = self.placed.overlap, (self.placed.crossings, self.placed.contact)
         return found
 
     @cached_property

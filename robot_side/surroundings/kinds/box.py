@@ -16,9 +16,12 @@ from robot_side.surroundings.kinds.layout import (
     OVERLAP,
     SHAPE_NUMBERS,
     TOUCHING_M,
+    WHOLE,
+    Chord,
     Contact,
     Nearest,
     around,
+    cut_chord,
     lengths,
     posed,
     rows,
@@ -104,6 +107,16 @@ def contact(shapes: FloatArray, row: int, start: Vector, radius: float, along: V
         x, y, z = x + step * u, y + step * v, z + step * w
     # A sphere that still moves grazes the box: it has not touched up to here.
     return moved, 1.0
+
+
+@inlined
+def chord(shapes: FloatArray, row: int, start: Vector, along: Vector) -> Chord:
+    """Return the chord of a line from `start` along the unit vector `along` in the box in `row`."""
+    found = WHOLE
+    for k in range(3):
+        place, rise, half = _along(shapes, row, k, start), dot(_axis(shapes, row, k), along), shapes[row, 12 + k]
+        found = cut_chord(cut_chord(found, place - half, rise), -place - half, -rise)
+    return found
 
 
 @building_block
@@ -240,6 +253,7 @@ KIND: Final = Kind(
     place=place,
     nearest=nearest,
     contact=contact,
+    chord=chord,
     kernel=overlap_one_box,
     in_box=True,
 )

@@ -17,8 +17,10 @@ from robot_side.surroundings.kinds.layout import (
     NUMBERS,
     OVERLAP,
     SHAPE_NUMBERS,
+    Chord,
     Nearest,
     around,
+    chord_of_ball,
     rows,
     to_metres,
 )
@@ -113,6 +115,14 @@ def nearest(shapes: FloatArray, row: int, point: Vector) -> Nearest:
 contact = convex_contact(nearest)
 
 
+@inlined
+def chord(shapes: FloatArray, row: int, start: Vector, along: Vector) -> Chord:
+    """Return the chord of a line from `start` along the unit vector `along` in the ellipsoid in `row`."""
+    (x, y, z), (u, v, w) = _local(shapes, row, start), _turned_back(shapes, row, along)
+    a, b, c = shapes[row, 12], shapes[row, 13], shapes[row, 14]
+    return chord_of_ball((x / a, y / b, z / c), (u / a, v / b, w / c), 1.0)
+
+
 @compiled(*OVERLAP, returns=FLOAT64)
 def overlap_one_ellipsoid(
     shapes: FloatArray,
@@ -165,6 +175,7 @@ KIND: Final = Kind(
     place=place,
     nearest=nearest,
     contact=contact,
+    chord=chord,
     kernel=overlap_one_ellipsoid,
     in_box=True,
 )

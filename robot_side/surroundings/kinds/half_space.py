@@ -7,7 +7,7 @@ import numpy as np
 
 from common.arrays import FloatArray
 from robot_side.compiled.kernel import inlined
-from robot_side.compiled.vectors import Vector, dot, negative
+from robot_side.compiled.vectors import Vector, dot, load, negative
 from robot_side.overlap.solids.half_space import cap
 from robot_side.overlap.solids.solid import Overlap
 from robot_side.surroundings.kinds.kind import Array, Check, Kind, Placed
@@ -18,9 +18,12 @@ from robot_side.surroundings.kinds.layout import (
     NUMBERS,
     SHAPE_NUMBERS,
     TOUCHING_M,
+    WHOLE,
+    Chord,
     Contact,
     Nearest,
     around,
+    cut_chord,
     rows,
 )
 
@@ -55,6 +58,13 @@ def contact(shapes: FloatArray, row: int, start: Vector, radius: float, along: V
 
 
 @inlined
+def chord(shapes: FloatArray, row: int, start: Vector, along: Vector) -> Chord:
+    """Return the chord of a line from `start` along the unit vector `along` in the half-space in `row`."""
+    normal = load(shapes, row)
+    return cut_chord(WHOLE, dot(normal, start) - shapes[row, 3], dot(normal, along))
+
+
+@inlined
 def overlap(shapes: FloatArray, row: int, center: Vector, radius: float) -> Overlap:
     """Return the overlap of a sphere with the half-space in `row` (eq. 12)."""
     normal = shapes[row, 0], shapes[row, 1], shapes[row, 2]
@@ -69,5 +79,6 @@ KIND: Final = Kind(
     place=place,
     nearest=nearest,
     contact=contact,
+    chord=chord,
     overlap=overlap,
 )

@@ -75,6 +75,8 @@ class Kind:
     """Function (shapes (n, 15), row, point) that returns a Nearest. It is compiled, as are all functions below."""
     contact: Callable[..., Any]
     """Function (shapes (n, 15), row, start, radius, along, reach) that returns a Contact"""
+    chord: Callable[..., Any]
+    """Function (shapes (n, 15), row, start, along) that returns a Chord"""
     overlap: Callable[..., Any] | None = None
     """Function (shapes (n, 15), row, center, radius) that returns an Overlap; None if only `kernel` computes it"""
     kernel: Compiled | None = None

@@ -8,7 +8,7 @@ import numpy as np
 from common.arrays import FloatArray
 from robot_side.compiled.columns import BUNDLE
 from robot_side.compiled.kernel import BOOL, FLOAT64, INT64, inlined, input_array, output_array, tuple_type
-from robot_side.compiled.vectors import Vector
+from robot_side.compiled.vectors import Vector, add, dot, scale
 from robot_side.overlap.solids.solid import sphere_volume
 
 SPHERE: Final = 0
@@ -35,6 +35,10 @@ Contact = tuple[float, float]
 the contact plane and points into the primitive. (0, 1) if the sphere overlaps already; (inf, 0) without a contact
 within the given reach."""
 NEVER: Final[Contact] = (math.inf, 0.0)
+Chord = tuple[float, float]
+"""Distances along a line at which it enters and leaves a convex body; it misses the body unless it enters earlier."""
+WHOLE: Final[Chord] = (-math.inf, math.inf)
+"""Chord of all space"""
 ANY_DIRECTION: Final = (0.0, 0.0, 1.0)
 """Direction for a point that is equally far in all directions"""
 
@@ -71,6 +75,8 @@ CONTACT: Final[tuple[Any, ...]] = (BUNDLE, INT64, *(FLOAT64,) * 8, BOOL)
 """Argument types of the contact kernel of meshes (see `placed_meshes`)"""
 MESH_CONTACT: Final[Any] = tuple_type(FLOAT64, FLOAT64)
 """Return type of the contact kernel of meshes: a `Contact`"""
+CROSSINGS: Final[tuple[Any, ...]] = (BUNDLE, INT64, *(FLOAT64,) * 6, output_array(2), INT64)
+"""Argument types of the kernel for a line's crossings of a mesh (see `placed_meshes`)"""
 TOUCHING_M: Final = 1e-7
 """Largest gap, and largest depth, in m, at which bodies touch but do not count as overlapping"""
 LEAST_CONTACT_M: Final = 1e-12
@@ -80,6 +86,26 @@ CLOSING: Final = 1e-9
 MOST_STEPS: Final = 60
 ENLARGED: Final = 1.0 + 1e-9
 """Factor on bounds around meshes, so that rounding never misses a contact"""
+
+
+@inlined
+def chord_of_ball(start: Vector, along: Vector, squared_radius: float) -> Chord:
+    """Return the chord of a ball around the origin; `along` need not be a unit vector."""
+    by = 1.0 / dot(along, along)
+    middle = -dot(start, along) * by
+    foot = add(start, scale(middle, along))
+    half = math.sqrt(max((squared_radius - dot(foot, foot)) * by, 0.0))
+    return middle - half, middle + half
+
+
+@inlined
+def cut_chord(chord: Chord, height: float, rise: float) -> Chord:
+    """Return the part of a chord below a plane, over which a line is by height + rise · t."""
+    enter, leave = chord
+    if rise == 0.0:
+        return (enter, leave) if height <= 0.0 else (0.0, 0.0)
+    at = -height / rise
+    return (enter, min(leave, at)) if rise > 0.0 else (max(enter, at), leave)
 
 
 @inlined

@@ -86,6 +86,7 @@ KIND: Final = Kind(
     place=place,
     nearest=box.nearest,
     contact=contact,
+    chord=box.chord,
     in_box=True,
     derive=_derive,
     more=lambda objects: of_library(objects.mesh_library, objects.mesh_index),

@@ -181,3 +181,34 @@ def closing_at(tables: MeshTables, triangle: int, sweep: Sweep, way: float) -> f
     towards = to_triangle(tables, triangle, add(sweep.start, scale(way, sweep.along)))
     distance = norm(towards)
     return max(dot(towards, sweep.along) / distance, CLOSING) if distance > 0.0 else 1.0
+
+
+@building_block
+def crossings_of(tables: MeshTables, mesh: int, line: Sweep, crossings: FloatArray, count: int) -> int:
+    """Append the crossings (n, 2) of a line with a mesh, as `crossings_of_mesh` does; return the new count."""
+    node, end, room = tables.roots[mesh], tables.roots[mesh + 1], crossings.shape[0]
+    while node < end:
+        enter, leave = -math.inf, math.inf
+        for axis in range(3):
+            first = (tables.boxes[node, axis] - TOUCHING_M - line.start[axis]) * line.by_axis[axis]
+            last = (tables.boxes[node, 3 + axis] + TOUCHING_M - line.start[axis]) * line.by_axis[axis]
+            enter, leave = max(enter, min(first, last)), min(leave, max(first, last))
+        if enter > leave:
+            node = tables.links[3 * node]
+            continue
+        begin, size = tables.links[3 * node + 1], tables.links[3 * node + 2]
+        for triangle in range(begin, begin + size):
+            a = subtract(corner_of(tables, triangle, 0), line.start)
+            b = subtract(corner_of(tables, triangle, 1), line.start)
+            c = subtract(corner_of(tables, triangle, 2), line.start)
+            # The sides of an edge in its two triangles are exactly opposite: a line passes between no two triangles.
+            sides = dot(line.along, cross(a, b)), dot(line.along, cross(b, c)), dot(line.along, cross(c, a))
+            leaves = sides[0] > 0.0 and sides[1] > 0.0 and sides[2] > 0.0
+            enters = sides[0] < 0.0 and sides[1] < 0.0 and sides[2] < 0.0
+            if (leaves or enters) and count < room:
+                normal = corner_of(tables, triangle, 3)
+                crossings[count, 0] = dot(normal, a) / dot(normal, line.along)
+                crossings[count, 1] = 1.0 if enters else -1.0
+                count += 1
+        node += 1
+    return count

@@ -5,7 +5,7 @@ from typing import Final
 
 from common.arrays import FloatArray
 from robot_side.compiled.kernel import inlined
-from robot_side.compiled.vectors import Vector, dot, norm, scale, subtract, unit
+from robot_side.compiled.vectors import Vector, dot, load, norm, scale, subtract, unit
 from robot_side.overlap.solids.solid import Overlap, nothing, sphere_volume, whole_solid, whole_sphere
 from robot_side.surroundings.kinds.kind import Array, Check, Kind, Placed
 from robot_side.surroundings.kinds.layout import (
@@ -15,8 +15,10 @@ from robot_side.surroundings.kinds.layout import (
     NUMBERS,
     SHAPE_NUMBERS,
     TOUCHING_M,
+    Chord,
     Contact,
     Nearest,
+    chord_of_ball,
     rows,
 )
 
@@ -55,6 +57,12 @@ def contact(shapes: FloatArray, row: int, start: Vector, radius: float, along: V
 
 
 @inlined
+def chord(shapes: FloatArray, row: int, start: Vector, along: Vector) -> Chord:
+    """Return the chord of a line from `start` along the unit vector `along` in the sphere in `row`."""
+    return chord_of_ball(subtract(start, load(shapes, row)), along, shapes[row, 3] * shapes[row, 3])
+
+
+@inlined
 def overlap(shapes: FloatArray, row: int, center: Vector, radius: float) -> Overlap:
     """Return the overlap of a sphere with the sphere in `row`, a lens (eq. 11): the sum of two caps."""
     offset = subtract((shapes[row, 0], shapes[row, 1], shapes[row, 2]), center)
@@ -81,5 +89,6 @@ KIND: Final = Kind(
     place=place,
     nearest=nearest,
     contact=contact,
+    chord=chord,
     overlap=overlap,
 )

@@ -16,8 +16,11 @@ from robot_side.surroundings.kinds.layout import (
     NUMBERS,
     OVERLAP,
     SHAPE_NUMBERS,
+    WHOLE,
+    Chord,
     Nearest,
     around,
+    cut_chord,
     lengths,
     posed,
     rows,
@@ -117,6 +120,19 @@ def nearest(shapes: FloatArray, row: int, point: Vector) -> Nearest:
 contact = convex_contact(nearest)
 
 
+@building_block
+def chord(shapes: FloatArray, row: int, start: Vector, along: Vector) -> Chord:
+    """Return the chord of a line from `start` along the unit vector `along` in the tetrahedron in `row`."""
+    a, b = _corner(shapes, row, 0, start), _corner(shapes, row, 1, start)
+    c, d = _corner(shapes, row, 2, start), _corner(shapes, row, 3, start)
+    sign = -1.0 if dot(cross(subtract(c, b), subtract(d, b)), subtract(b, a)) < 0.0 else 1.0
+    found = WHOLE
+    for first, second, third in ((b, c, d), (a, d, c), (a, b, d), (a, c, b)):
+        normal = scale(sign, cross(subtract(second, first), subtract(third, first)))
+        found = cut_chord(found, -dot(normal, first), dot(normal, along))
+    return found
+
+
 @compiled(*OVERLAP, returns=FLOAT64)
 def overlap_one_tetrahedron(
     shapes: FloatArray,
@@ -148,5 +164,6 @@ KIND: Final = Kind(
     place=place,
     nearest=nearest,
     contact=contact,
+    chord=chord,
     kernel=overlap_one_tetrahedron,
 )
