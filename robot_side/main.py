@@ -98,7 +98,7 @@ def command(arguments: Sequence[str], adapt: Callable[[RobotParts], Adapted] = a
             recording.begin(provenance(settings, epoch, clock_domain()) | also)
         model = PerceivedModel(parts.scene) if parts.any_objects else SceneModel(parts.scene)
         eyes = (first_person_eye(parts.scene), overview_eye(parts.scene)) if settings.cameras.on else (None, None)
-        view = SceneView(model, parts.kinematics, parts.explains, parts.surroundings, *eyes)
+        view = SceneView(model, parts.kinematics, parts.explains, parts.enlarged, parts.surroundings, *eyes)
 
         def open_side() -> RobotTurns:
             at = door.listen()

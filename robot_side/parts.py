@@ -39,6 +39,7 @@ from robot_side.drivers.remote.driver_session import ArmShape
 from robot_side.drivers.remote.frame_message import perceived
 from robot_side.gripper.held_covers import HeldCovers
 from robot_side.gripper.kept_covers import SearchNotes
+from robot_side.laws.enlarged_gripper import EnlargedGripper
 from robot_side.laws.inputs import LawInputs
 from robot_side.laws.named import make_law
 from robot_side.operators.episodes import Episodes
@@ -67,6 +68,7 @@ class SceneParts(RobotParts):
     """Whether objects of any kind may appear during the run"""
     explains: "NamedLaw"
     """Law named in the settings, even if an experiment replaces `law`"""
+    enlarged: EnlargedGripper
 
     @property
     def kernels(self) -> list[Compiled]:
@@ -126,6 +128,12 @@ def build_parts(
     encoder_sigma_rad = np.full(arm.joint_count, encoder.standard_deviation_rad())
     inputs = LawInputs(errors, encoder_sigma_rad, joint_limits, settings.motion, surroundings, settings.paper)
     law = make_law(settings.law if law is None else law, inputs)
+    enlarged = EnlargedGripper(inputs)
+
+    def expect(probability: float) -> None:
+        law.expect(probability)
+        enlarged.expect(probability)
+
     link = settings.seed, settings.asymmetry_s(), settings.tick_period_s()
     late = *prediction_note, *_cover_notes(kinematics.cover, settings.cover_m, held_covers)
     for text in late:
@@ -136,12 +144,13 @@ def build_parts(
         camera=seen_elsewhere or perceived_by(settings.perception, camera),
         law=law,
         explains=law,
+        enlarged=enlarged,
         surroundings=surroundings,
         session=OperatorSession(
             lambda: LinkEnd("robot", epoch, clock_domain, *link),
             Safety(settings.safety),
             settings.seed,
-            Tuning(settings.probability, law.expect if settings.permit_tuning else None),
+            Tuning(settings.probability, expect if settings.permit_tuning else None),
             _episodes(settings, arm, camera),
         ),
         loop_age=LoopAge(settings.assumed_delay_s),

@@ -172,8 +172,9 @@ class SceneState(Message, frozen=True, tag="scene"):
     spheres: bytes
     """(m, 4) float32: centre and radius of the spheres of the gripper and of the held object"""
     overlaps: tuple[tuple[_Index, float, float], ...]
-    """(object index, volume for L2, for R2): overlap of each object, in m³, with the gripper inflated by D_σ and moved
-    by the robot side's δ, if any"""
+    """(object index, volume for L2, for R2): what each object shares, in m³, with the union of the gripper's spheres,
+    inflated by D_σ and moved by the robot side's δ. Space within several objects counts for one: the volumes add up.
+    Worked out ten times a second"""
     l2: EnlargementTerms
     r2: EnlargementTerms
     tick_p50_us: float

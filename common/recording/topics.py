@@ -84,13 +84,13 @@ class Terms(msgspec.Struct, frozen=True):
 
 
 class ObjectOverlap(msgspec.Struct, frozen=True):
-    """Overlap of an object along each trigger."""
+    """Volume that the enlarged gripper shares with an object, along each trigger."""
 
     object: str
     l2_mm3: float
-    """Overlap of the object OBJECT with the gripper inflated by D_σ and moved by δ along L2 (eq. 11-12)"""
+    """Volume of object OBJECT in the gripper inflated by D_σ and moved by δ along L2, counted once (eq. 11-12)"""
     r2_mm3: float
-    """Overlap of the object OBJECT with the gripper inflated by D_σ and moved by δ along R2 (eq. 11-12)"""
+    """Volume of object OBJECT in the gripper inflated by D_σ and moved by δ along R2, counted once (eq. 11-12)"""
 
 
 class Overlaps(ViewStamps, frozen=True):

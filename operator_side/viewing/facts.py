@@ -107,7 +107,7 @@ class SceneFacts(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Overlap, and the robot side's tick times."""
 
     overlap_mm3: float
-    """Overlap with all objects along the trigger for which the sum is larger (eq. 11-12)"""
+    """Volume shared with the gripper, inflated by D_σ and moved by δ along the trigger for which it is larger"""
     tick_us: float
     """Median duration of the robot side's recent ticks"""
     tick_p99_us: float

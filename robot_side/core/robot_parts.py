@@ -15,6 +15,7 @@ from robot_side.operators.operator_session import OperatorSession
 from robot_side.outcome.figures import Observer
 from robot_side.surroundings.perceived import ObjectSource
 from robot_side.surroundings.surroundings import Surroundings
+from robot_side.tick.explained import Overlapping
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,6 +42,8 @@ class RobotParts:
     """(n,) joint positions of the start pose; None: there is no way home"""
     frames: StickFrames | None = None
     """Frames in which an operator may steer besides the tool's; None: as the tool's"""
+    enlarged: Overlapping | None = None
+    """Enlarged gripper, for the figures; None: what it shares with objects is unknown"""
     truth: Observer | None = None
     """Observer of true contacts and distances, for the figures; None if these are unknown"""
     held_covers: HeldCovers | None = None

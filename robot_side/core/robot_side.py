@@ -49,7 +49,7 @@ class RobotSide:
         home = parts.kinematics, parts.surroundings
         self.homing = None if parts.home_rad is None else Homing(parts.home_rad, parts.limits, *home)
         self.reports = Reports(parts.session, parts.law.around, parts.frames, full_rate=parts.full_rate)
-        self.figures = RunFigures(parts.seed, parts.truth)
+        self.figures = RunFigures(parts.seed, parts.truth, parts.enlarged)
         self.newest: tuple[Sensed, Situation] | None = None
         """Result of the law in the last tick, and the situation for which it was computed"""
         self._joints = JointEstimate()

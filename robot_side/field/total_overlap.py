@@ -1,4 +1,4 @@
-"""Sums of the overlaps of a gripper's spheres with all objects, for each object, and by what lies ahead (eq. 11-12).
+"""Sums of the overlaps of a gripper's spheres with all objects, whole and by what lies ahead (eq. 11-12).
 
 A sum of overlaps is no volume: it counts space once for each sphere that covers it.
 """
@@ -19,7 +19,6 @@ from robot_side.surroundings.scene_columns import SCENE, next_object
 from robot_side.surroundings.scene_table import SceneTable
 
 _scene_at = SCENE.at
-_NOWHERE = np.empty(0)
 _NO_DIRECTION: Final = np.zeros(3)
 _SWALLOWED: Final = 1e-9
 """Gradient |∇V| over R² up to which a sphere counts as one that has swallowed the primitive, or lies within it"""
@@ -35,15 +34,12 @@ class OverlapsAlong(NamedTuple):
     """Σ V_ij max(0, -û·n)"""
 
 
-def total_overlap_m3(
-    spheres: FloatArray, scene: SceneTable, classes: IntArray, of_objects_m3: FloatArray = _NOWHERE
-) -> float:
+def total_overlap_m3(spheres: FloatArray, scene: SceneTable, classes: IntArray) -> float:
     """Return Σ V_ij in m³ of spheres i (m, 4), centres and radii, with all objects j except those of the class SKIPPED.
 
-    classes (k,): the objects'. of_objects_m3 (k,), if given, is filled with the sum for each object that is near; other
-    entries stay. ValueError for a sphere that is not finite, because it would compare as far away.
+    classes (k,): the objects'. ValueError for a sphere that is not finite, because it would compare as far away.
     """
-    return _sums(spheres, spheres[:, 3], _NO_DIRECTION, scene, classes, of_objects_m3).all_m3
+    return overlaps_along(spheres, spheres[:, 3], _NO_DIRECTION, scene, classes).all_m3
 
 
 def overlaps_along(
@@ -55,29 +51,18 @@ def overlaps_along(
     points to the primitive's middle, or into the half-space. A sphere at that middle counts as ahead and as behind.
     radii_to_target_m (m,): radii that count for objects of the class TARGET, none larger than the spheres'.
     """
-    return _sums(spheres, radii_to_target_m, direction, scene, classes, _NOWHERE)
-
-
-def _sums(
-    spheres: FloatArray,
-    radii_to_target_m: FloatArray,
-    direction: FloatArray,
-    scene: SceneTable,
-    classes: IntArray,
-    of_objects_m3: FloatArray,
-) -> OverlapsAlong:
     require_finite("spheres", spheres)
     to_target_m = np.ascontiguousarray(radii_to_target_m)
     require_finite("radii_to_target_m", to_target_m)
     whole, along = around(spheres, np.array([0, len(spheres)]))[0], np.empty(2)
     given = spheres, to_target_m, np.ascontiguousarray(direction), whole, classes, scene.bundle
-    total_m3 = _sum_overlaps(*given, np.empty(3), of_objects_m3, along)
+    total_m3 = _sum_overlaps(*given, np.empty(3), along)
     return OverlapsAlong(float(total_m3), *map(float, along))
 
 
 @compiled(
     *(input_array(2), input_array(1), input_array(1), input_array(1), input_indices(), BUNDLE),
-    *(output_array(1), output_array(1), output_array(1)),
+    *(output_array(1), output_array(1)),
     returns=FLOAT64,
 )
 def _sum_overlaps(
@@ -88,7 +73,6 @@ def _sum_overlaps(
     classes: IntArray,
     scene_bundle: IntArray,
     overlap_gradient: FloatArray,
-    of_objects: FloatArray,
     along: FloatArray,
 ) -> float:
     """Return Σ V_ij in m³ as `total_overlap_m3` does; fill `along` (2,) with what lies ahead and behind.
@@ -99,7 +83,7 @@ def _sum_overlaps(
     middle, size, forth = (whole[0], whole[1], whole[2]), whole[3], (direction[0], direction[1], direction[2])
     place, ahead, behind = next_object(scene, 0, middle, nowhere, 0.0, size), 0.0, 0.0
     while place < scene.object_order.size:
-        thing, mine = scene.object_order[place], 0.0
+        thing = scene.object_order[place]
         place = next_object(scene, place + 1, middle, nowhere, 0.0, size)
         if classes[thing] == SKIPPED:
             continue
@@ -115,7 +99,7 @@ def _sum_overlaps(
                     volume = overlap(
                         kind, scene.kernels, scene.shapes, row, center, radius, scene.meshes, overlap_gradient
                     )
-                    mine += volume
+                    total += volume
                     towards = (overlap_gradient[0], overlap_gradient[1], overlap_gradient[2])
                     if norm(towards) <= _SWALLOWED * radius * radius:
                         if kind == HALF_SPACE:
@@ -127,8 +111,5 @@ def _sum_overlaps(
                     cosine = dot(forth, towards) / length if length > 0.0 else 0.0
                     ahead += volume * (max(cosine, 0.0) if length > 0.0 else 1.0)
                     behind += volume * (max(-cosine, 0.0) if length > 0.0 else 1.0)
-        total += mine
-        if of_objects.size > 0:
-            of_objects[thing] = mine
     along[0], along[1] = ahead, behind
     return total

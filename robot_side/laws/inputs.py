@@ -36,12 +36,13 @@ class LawInputs:
     paper: PaperSettings = field(default_factory=PaperSettings)
     """Settings of the paper's own law"""
 
-    def overlap_m3(
+    def total_overlap_m3(
         self, situation: Situation, inflated_m: float | FloatArray = 0.0, moved_m: FloatArray | None = None
     ) -> float:
-        """Return Σ V_ij (eq. 11-12), the overlap of the gripper's spheres with all things but what is held.
+        """Return Σ V_ij (eq. 11-12) over the gripper's spheres i and all things j but what is held.
 
-        inflated_m: growth of every radius, or (m,) of each. moved_m (3,): displacement of the gripper in the world.
+        Space counts once for each sphere that covers it. inflated_m: growth of every radius, or (m,) of each. moved_m
+        (3,): displacement of the gripper in the world.
         """
         pose = situation.pose
         centers_m = pose.sphere_centers_m if moved_m is None else pose.sphere_centers_m + moved_m
@@ -51,20 +52,18 @@ class LawInputs:
     def nearest_m(self, situation: Situation, farthest_m: float = 0.2) -> float:
         """Return the distance from the gripper to the nearest thing, to a thousandth of `farthest_m`, at most that."""
         near_m, far_m = 0.0, farthest_m
-        if self.overlap_m3(situation, farthest_m) == 0.0:
+        if self.total_overlap_m3(situation, farthest_m) == 0.0:
             return farthest_m
         for _ in range(_NEAREST_STEPS):
             middle_m = 0.5 * (near_m + far_m)
-            near_m, far_m = (near_m, middle_m) if self.overlap_m3(situation, middle_m) > 0.0 else (middle_m, far_m)
+            meets = self.total_overlap_m3(situation, middle_m) > 0.0
+            near_m, far_m = (near_m, middle_m) if meets else (middle_m, far_m)
         return near_m
 
-    def sensed(
-        self, situation: Situation, *, l2: float, r2: float, enlargement_m: float = 0.0, overlap_m3: float = 0.0
-    ) -> Sensed:
+    def sensed(self, situation: Situation, *, l2: float, r2: float, enlargement_m: float = 0.0) -> Sensed:
         """Return the result of a law that has one stiffness for each trigger, 0 to 1, at every travel.
 
-        It is rounded to eighths. enlargement_m, overlap_m3: for the run's figures. ValueError for a stiffness out of
-        range.
+        It is rounded to eighths. enlargement_m: for the run's figures. ValueError for a stiffness out of range.
         """
         for name, stiffness in (("l2", l2), ("r2", r2)):
             if not 0.0 <= stiffness <= 1.0:
@@ -79,7 +78,6 @@ class LawInputs:
             tool_speed_m_s=float(np.linalg.norm(velocity_m_s)),
             horizon_m=FAR_M,
             enlargement_m=enlargement_m,
-            overlap_m3=overlap_m3,
         )
 
 

@@ -1,6 +1,5 @@
 """Looks of one tick: along each side from the present pose, from waypoints on the path, and from the map's probes."""
 
-import math
 from dataclasses import dataclass, field
 from typing import Final, NamedTuple
 
@@ -10,10 +9,8 @@ from common.arrays import FloatArray, IntArray
 from common.protocol.around import PROBES
 from robot_side.field.field import Ahead, Field
 from robot_side.field.scratch import MOST_WORK, Count
-from robot_side.field.total_overlap import total_overlap_m3
 from robot_side.laws.around import RETREATS_M_S, ProbeLooks, probe
 from robot_side.laws.classes import Classes
-from robot_side.laws.explanation import moved_and_inflated
 from robot_side.laws.gripper_motion import GripperMotion
 from robot_side.laws.path import Drift, Waypoint, times_ahead_s, waypoints
 from robot_side.laws.prospect import Assumed, Prospect, prospect, stopping_s
@@ -22,8 +19,6 @@ from robot_side.surroundings.scene_table import SceneTable
 from robot_side.tick.sensed import L2, R2, STICK
 from robot_side.tick.situation import Situation
 
-_OVERLAP_PERIOD_S: Final = 0.02
-"""Period at which the overlap at δ is computed; this figure is for display only"""
 _SELDOM_S: Final = 0.03
 """Period of looks along the trigger against which the gripper moves"""
 _ROUNDING_S: Final = 1e-9
@@ -59,8 +54,6 @@ class Looking:
     sides: tuple[RecentLooks, ...] = field(default_factory=lambda: tuple(RecentLooks() for _ in (R2, L2, STICK)))
     newest: dict[int, Newest] = field(default_factory=dict)
     """Newest look along each side from the present pose"""
-    overlap_m3: float = 0.0
-    """Newest Σ V_ij at δ along the side that leads"""
     looks: int = 0
     with_nothing_near: int = 0
     """Looks in which no sphere touched an object within the examined distance"""
@@ -68,7 +61,6 @@ class Looking:
     """Result of the newest tick's further looks, once its looks had done more than `MOST_WORK`; None if they had not"""
     work: IntArray = field(default_factory=lambda: np.zeros(len(Count), dtype=np.int64))
     """Counts of the looks' work, indexed by `Count`"""
-    _next_overlap_s: float = -math.inf
     _done: int = 0
 
     def look(self, seen: Seen, *, changed: bool) -> None:
@@ -122,17 +114,10 @@ class Looking:
         return made, direction, began_m, found.from_tool_m(made.onsets_m)
 
     def _look_from_here(self, side: int, seen: Seen) -> None:
-        found, motion = seen.prospect(side), seen.motion
+        found = seen.prospect(side)
         made, direction, began_m, onsets_m = self._one(found, seen)
         self.sides[side].add(0, seen.now_s, direction, began_m, onsets_m)
         self.newest[side] = Newest(seen.now_s, direction, began_m, found.asked.along.reach_m, found.able, made.sigma_m)
-        leads = side == (R2 if motion.ahead_m_s >= 0.0 else L2)
-        # For display only, and as dear as the look that was cut short.
-        if leads and seen.now_s >= self._next_overlap_s and not made.counts[Count.CUT]:
-            self._next_overlap_s = seen.now_s + _OVERLAP_PERIOD_S - _ROUNDING_S
-            displacement_m = abs(motion.ahead_m_s) * seen.situation.loop_age_s * direction
-            spheres = moved_and_inflated(seen.situation.pose, displacement_m, made.sigmas_m)
-            self.overlap_m3 = total_overlap_m3(spheres, seen.scene, found.asked.classes)
 
     def _look_from_waypoints(self, seen: Seen, until_s: float, *, traced: bool) -> None:
         """Look along R2 and L2 from the waypoints on the gripper's path that are new, or due."""

@@ -8,7 +8,7 @@ from common.protocol.around import Around
 from common.protocol.view_messages import EnlargementTerms
 from robot_side.arm.port import GripperPose
 from robot_side.laws.inputs import LawInputs
-from robot_side.tick.explained import Trigger, TriggerExplained
+from robot_side.tick.explained import Trigger
 from robot_side.tick.sensed import Sensed
 from robot_side.tick.situation import Situation
 
@@ -56,9 +56,9 @@ class OwnLaw:
         """Pass on another P of eq. 10 to a law that takes one."""
         self._call("expect", probability)
 
-    def explain(self, trigger: Trigger, situation: Situation, sensed: Sensed) -> TriggerExplained:
-        """Return the law's terms and overlaps, if it explains itself."""
-        return self._call("explain", trigger, situation, sensed) or TriggerExplained(_NO_TERMS, {})
+    def explain(self, trigger: Trigger, situation: Situation, sensed: Sensed) -> EnlargementTerms:
+        """Return the law's terms, if it explains itself."""
+        return self._call("explain", trigger, situation, sensed) or _NO_TERMS
 
     def _call(self, method: str, *arguments: object) -> Any:
         """Call a method of the law's, if it has it; FeelaheadError if it fails."""

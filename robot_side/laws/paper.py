@@ -23,9 +23,8 @@ from robot_side.enlargement.kinematic_error import position_covariance
 from robot_side.field.object_class import TARGET
 from robot_side.field.total_overlap import overlaps_along
 from robot_side.laws.classes import classes_of
-from robot_side.laws.explanation import moved_and_inflated, overlaps_by_object
-from robot_side.laws.inputs import LawInputs, everything_but_held
-from robot_side.tick.explained import Trigger, TriggerExplained
+from robot_side.laws.inputs import LawInputs
+from robot_side.tick.explained import Trigger
 from robot_side.tick.sensed import Sensed
 from robot_side.tick.situation import Situation
 
@@ -67,16 +66,13 @@ class PaperLaw:
         """Return how often the overlap was computed during the run, and how often the gap limited D_incr."""
         return {"fields": self.looked, "limited_by_gap": self.limited}
 
-    def explain(self, trigger: Trigger, situation: Situation, sensed: Sensed) -> TriggerExplained:
-        """Return the terms of D_incr and the overlaps with each object; both triggers have the same.
+    def explain(self, trigger: Trigger, situation: Situation, sensed: Sensed) -> EnlargementTerms:
+        """Return the terms of D_incr; both triggers have the same.
 
         The terms are those of the sphere with the largest D_incr; its displacement is |v| t_d.
         """
         del trigger, sensed
-        by_m, terms = self._enlarged(situation)
-        spheres = moved_and_inflated(situation.pose, np.zeros(3), by_m)
-        table = self._inputs.surroundings.see(situation.objects)
-        return TriggerExplained(terms, overlaps_by_object(spheres, table, everything_but_held(situation)))
+        return self._enlarged(situation)[1]
 
     def _enlarged(self, situation: Situation) -> tuple[FloatArray, EnlargementTerms]:
         """Return D_incr (m,) of the spheres, and the terms of the largest."""
@@ -113,17 +109,16 @@ class PaperLaw:
         figures = {"enlargement_m": float(by_m.max())}
         full_m3 = inputs.paper.share * _SPHERE * float((radii_m**3).sum())
         if self._isotropic:
-            overlap_m3 = inputs.overlap_m3(situation, by_m)
-            stiffness = min(1.0, overlap_m3 / full_m3)
-            return inputs.sensed(situation, l2=stiffness, r2=stiffness, overlap_m3=overlap_m3, **figures)
+            stiffness = min(1.0, inputs.total_overlap_m3(situation, by_m) / full_m3)
+            return inputs.sensed(situation, l2=stiffness, r2=stiffness, **figures)
         to_target_m = radii_m
         if situation.gap_m is not None:
             widest_m = 0.5 * max(situation.gap_m, 0.0)
             to_target_m = np.where(pose.sphere_on_finger, pose.sphere_radii_m + np.minimum(by_m, widest_m), radii_m)
-        spheres = moved_and_inflated(pose, np.zeros(3), by_m)
+        spheres = np.concatenate([pose.sphere_centers_m, radii_m[:, None]], axis=1)
         classes = classes_of(situation.objects, situation.held).usual
         self.limited += int((to_target_m < radii_m).any() and (classes == TARGET).any())
         table = inputs.surroundings.see(situation.objects)
         found = overlaps_along(spheres, to_target_m, pose.tool_rotation[:, 2], table, classes)
         l2, r2 = (min(1.0, overlap_m3 / full_m3) for overlap_m3 in (found.behind_m3, found.ahead_m3))
-        return inputs.sensed(situation, l2=l2, r2=r2, overlap_m3=found.all_m3, **figures)
+        return inputs.sensed(situation, l2=l2, r2=r2, **figures)

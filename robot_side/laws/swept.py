@@ -23,6 +23,7 @@ import numpy as np
 from common.arrays import FloatArray
 from common.protocol.around import MOST_JOINTS, Around
 from common.protocol.messages import TriggerField
+from common.protocol.view_messages import EnlargementTerms
 from common.touch_speed import touch_speed_m_s
 from robot_side.arm.ability import change_times_s
 from robot_side.arm.port import GripperPose
@@ -41,7 +42,7 @@ from robot_side.laws.looking import Looking, Seen
 from robot_side.laws.path import Waypoint
 from robot_side.laws.prospect import Asked, Assumed, horizon_m
 from robot_side.laws.trigger_field import rumble, trigger_field
-from robot_side.tick.explained import Trigger, TriggerExplained
+from robot_side.tick.explained import Trigger
 from robot_side.tick.sensed import L2, R2, STICK, Sensed
 from robot_side.tick.situation import Situation
 
@@ -131,7 +132,6 @@ class SweptLaw:
             horizon_m=min(max(known_m, 0.0), MOST_M),
             rumble=shakes,
             enlargement_m=motion.speed_m_s * age_s + leading.sigma_m,
-            overlap_m3=looking.overlap_m3,
             tool_speed_m_s=motion.speed_m_s,
             cut=looking.cut is not None,
         )
@@ -170,11 +170,11 @@ class SweptLaw:
             "flat": flat,
         }
 
-    def explain(self, trigger: Trigger, situation: Situation, sensed: Sensed) -> TriggerExplained:
-        """Return the terms of D_σ along one trigger, and the overlaps at the robot side's δ."""
+    def explain(self, trigger: Trigger, situation: Situation, sensed: Sensed) -> EnlargementTerms:
+        """Return the terms of D_σ along one trigger."""
         felt, side = (sensed.l2, L2) if trigger == "l2" else (sensed.r2, R2)
-        scene, sigma_rad = self.surroundings.see(situation.objects), self.looking.ahead.encoder_sigma_rad
-        return explained(situation, self.asked(side, situation), felt.displacement_m, sigma_rad, scene)
+        along, sigma_rad = self.asked(side, situation).along, self.looking.ahead.encoder_sigma_rad
+        return explained(situation, along, felt.displacement_m, sigma_rad)
 
     def asked(self, side: int, situation: Situation, waypoint: Waypoint | None = None) -> Asked:
         """Return the arguments of a look along one side, from the present pose or from a waypoint."""

@@ -13,12 +13,15 @@ from common.roles import Role
 from common.statistics import BLOCK, RunningStatistics
 from robot_side.outcome.placing import Placing, scaled
 from robot_side.tick.events import Listener, Tick
+from robot_side.tick.explained import Overlapping
 from robot_side.tick.sensed import Sensed
+from robot_side.tick.situation import Situation
 
 if TYPE_CHECKING:
     from robot_side.tick.truth import ContactOnset, Truth
 
 TRUTH_PERIOD_S = 0.01
+OVERLAP_PERIOD_S = 0.1
 MOVING_M_S = 0.01
 """Speed above which the tool counts as moving."""
 _CONTACT_REST_S = 0.1
@@ -33,9 +36,15 @@ _MOST_ROWS = 8 * BLOCK
 class RunFigures(Listener):
     """Statistics over the ticks of a run; control never reads them."""
 
-    def __init__(self, seed: int = 0, truth: Observer | None = None) -> None:
-        """truth: observer of the simulation; None if there is none."""
+    def __init__(self, seed: int = 0, truth: Observer | None = None, enlarged: Overlapping | None = None) -> None:
+        """truth: observer of the simulation; None if there is none. enlarged: gripper whose overlap is a figure."""
         self.ticks = 0
+        self.overlap_m3: float | None = None
+        """Newest volume that the enlarged gripper shares with objects; None before the loop age is known"""
+        self._enlarged = enlarged
+        self._next_overlap_s = -np.inf
+        self._situation: Situation | None = None
+        """Newest situation with a known loop age that `overlap_m3` is not of"""
         self._observer = truth
         self._knows_truth = truth is not None
         self._start_s: float | None = None
@@ -82,6 +91,11 @@ class RunFigures(Listener):
         self._read()
         if len(self._rows) >= BLOCK:
             self._take_in()
+        if self._enlarged is not None and self._situation is not None and now_s >= self._next_overlap_s:
+            self._next_overlap_s = now_s + OVERLAP_PERIOD_S - 1e-9
+            self.overlap_m3 = self._enlarged.overlap_m3(self._situation)
+            self._overlap.add(self.overlap_m3)
+            self._situation = None
         if self._observer is not None:
             if not self.touched and (onset := self._observer.contact()) is not None:
                 self.first_contact(onset, now_s)
@@ -101,12 +115,13 @@ class RunFigures(Listener):
             armed = found.motion_state == "armed"
             if found.situation.loop_age_known:
                 self._loop_age.add(found.situation.loop_age_s)
+                self._situation = found.situation
             self.tick(found.sensed, armed=armed, settled=found.situation.loop_age_settled)
             self.task(armed, found.holds_target, found.target_m, tick.now_s)
         self._unread.clear()
 
     def tick(self, sensed: Sensed, *, armed: bool = True, settled: bool = True) -> None:
-        """Add a tick's enlargement, overlap and stiffness.
+        """Add a tick's enlargement and stiffness.
 
         Stiffness counts as 0 unless the arm is armed, as nobody feels it. settled: whether the loop age is; until then
         the enlargement is unknown.
@@ -123,7 +138,6 @@ class RunFigures(Listener):
         self._enlargement_moving.extend(
             [sensed.enlargement_m for sensed, _, settled in rows if settled and sensed.tool_speed_m_s > MOVING_M_S]
         )
-        self._overlap.extend([sensed.overlap_m3 for sensed, _, _ in rows])
         self._l2.extend([armed * sensed.l2.course_stiffness for sensed, armed, _ in rows])
         self._r2.extend([armed * sensed.r2.course_stiffness for sensed, armed, _ in rows])
 

@@ -1,6 +1,5 @@
-"""Explanation of one trigger's field, for display: terms of the enlargement, and overlap with each object."""
+"""Explanation of one trigger's field, for display: terms of the enlargement, and volume shared with each object."""
 
-from dataclasses import dataclass
 from typing import Literal, Protocol
 
 from common.protocol.view_messages import EnlargementTerms
@@ -9,22 +8,25 @@ from robot_side.tick.situation import Situation
 
 Trigger = Literal["l2", "r2"]
 Overlaps = dict[int, float]
-"""Overlap in m³, keyed by the object's index; objects without overlap are left out"""
-
-
-@dataclass(frozen=True)
-class TriggerExplained:
-    """Enlargement and overlaps along one trigger."""
-
-    terms: EnlargementTerms
-    overlaps_m3: Overlaps
-    """Overlaps (eq. 11-12) of the enlarged gripper. swept: inflated by D_σ and moved by the robot side's δ. paper:
-    inflated by D_incr and not moved."""
+"""Volumes in m³ that the enlarged gripper shares with objects, keyed by the object's index; objects without are left
+out. The gripper is the union of its spheres, inflated by D_σ and moved by the robot side's δ. Space counts once."""
 
 
 class Explains(Protocol):
     """Interface of a law that can explain its result."""
 
-    def explain(self, trigger: Trigger, situation: Situation, sensed: Sensed) -> TriggerExplained:
-        """Return the terms and overlaps behind one trigger's field in `sensed`, which the law found for `situation`."""
+    def explain(self, trigger: Trigger, situation: Situation, sensed: Sensed) -> EnlargementTerms:
+        """Return the terms behind one trigger's field in `sensed`, which the law found for `situation`."""
+        ...
+
+
+class Overlapping(Protocol):
+    """Interface of the enlarged gripper, which is the same under any law."""
+
+    def overlaps_m3(self, trigger: Trigger, situation: Situation) -> Overlaps:
+        """Return the volumes shared with objects, for the gripper enlarged along one trigger."""
+        ...
+
+    def overlap_m3(self, situation: Situation) -> float:
+        """Return the volume shared with all objects, along the trigger that leads."""
         ...

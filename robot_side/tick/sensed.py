@@ -27,14 +27,12 @@ class Sensed:
     """Rumble, 0 to 1 in eighths: the share of strengths that begin within the stopping distance along the stick"""
     enlargement_m: float = 0.0
     """D_incr of eq. 10 along the motion, |v| t_d + D_σ; for the sphere with the largest"""
-    overlap_m3: float = 0.0
-    """Total overlap Σ V_ij of the enlarged gripper with all objects (eq. 11-12)"""
     tool_speed_m_s: float = 0.0
     """Speed |v| of the tool's point in any direction"""
     cut: bool = False
     """Whether there was too much to look at, so that all strengths begin at once"""
 
     def __post_init__(self) -> None:
-        for name in ("speed_m_s", "horizon_m", "rumble", "enlargement_m", "overlap_m3", "tool_speed_m_s"):
+        for name in ("speed_m_s", "horizon_m", "rumble", "enlargement_m", "tool_speed_m_s"):
             if not math.isfinite(getattr(self, name)):
                 raise ValueError(f"{name} = {getattr(self, name)}; valid: a finite number")

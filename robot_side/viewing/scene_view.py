@@ -1,5 +1,6 @@
 """Messages with the perceived scene for viewers: shapes, poses and the law's results."""
 
+import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Final
@@ -10,13 +11,13 @@ from scipy.spatial.transform import Rotation
 from common.arrays import FloatArray, IntArray
 from common.protocol.codec import VIEW_MAXIMUM_BYTES, Prepared
 from common.protocol.messages import Header
-from common.protocol.view_messages import Eye, Near, SceneShapes, SceneState, Shape
+from common.protocol.view_messages import EnlargementTerms, Eye, Near, SceneShapes, SceneState, Shape
 from common.roles import ROLES, Role
 from robot_side.drivers.mujoco.kinematics import MujocoKinematics
 from robot_side.surroundings.perceived import PerceivedObjects
 from robot_side.surroundings.perceived_distances import perceived_distances
 from robot_side.surroundings.surroundings import Surroundings
-from robot_side.tick.explained import Explains, Trigger, TriggerExplained
+from robot_side.tick.explained import Explains, Overlapping, Overlaps, Trigger
 from robot_side.tick.outgoing import SHOWN_NAME
 from robot_side.tick.sensed import Sensed
 from robot_side.tick.situation import Situation
@@ -30,6 +31,7 @@ _MOST_SHAPES_BYTES: Final = VIEW_MAXIMUM_BYTES - 65536
 _ENTRY_BYTES: Final = 40
 """Bytes of an object in a message, besides its name and its shapes"""
 _SHAPES_AT_ONCE: Final = 16
+_OVERLAPS_PERIOD_S: Final = 0.1 - 1e-9
 
 
 @dataclass
@@ -52,7 +54,8 @@ class _Begun:
     link_poses: bytes
     object_index: IntArray
     object_poses: bytes
-    explained: dict[Trigger, TriggerExplained] = field(default_factory=dict)
+    terms: dict[Trigger, EnlargementTerms] = field(default_factory=dict)
+    overlaps_m3: dict[Trigger, Overlaps] = field(default_factory=dict)
 
 
 class SceneView:
@@ -63,6 +66,7 @@ class SceneView:
         model: SceneModel,
         kinematics: MujocoKinematics,
         law: Explains,
+        enlarged: Overlapping,
         surroundings: Surroundings,
         eye: Eye | None = None,
         overview_eye: Eye | None = None,
@@ -75,7 +79,10 @@ class SceneView:
         self.left_out = 0
         self._model = model
         self._kinematics = kinematics
-        self._law = law
+        self._law, self._enlarged = law, enlarged
+        self._overlaps_m3: dict[Trigger, Overlaps] = {}
+        """Newest overlaps along each trigger, which several messages tell"""
+        self._next_overlaps_s = -math.inf
         self._surroundings, self._eyes = surroundings, (eye, overview_eye)
         self._links: tuple[tuple[Shape, ...], int] | None = None
         self._base: PerceivedObjects | None = None
@@ -90,7 +97,9 @@ class SceneView:
 
     def outdated(self, objects: PerceivedObjects) -> bool:
         """Return whether this frame has other objects or shapes than the frame before."""
-        return self._model.update(objects)
+        if outdated := self._model.update(objects):
+            self._next_overlaps_s = -math.inf
+        return outdated
 
     def begin_shapes(self, header: Header, situation: Situation) -> None:
         """Begin to make SceneShapes anew, with the objects nearest to the tool first."""
@@ -112,23 +121,32 @@ class SceneView:
         index = self._moved(situation.objects)
         poses = object_poses(situation.objects, index)
         self._begun = _Begun(sensed, situation, taken_s, self.version, links, index, _row_bytes(poses))
+        if taken_s < self._next_overlaps_s:
+            self._begun.overlaps_m3.update(self._overlaps_m3)
+        else:
+            self._next_overlaps_s = taken_s + _OVERLAPS_PERIOD_S
 
     def work_on_state(self, header: Callable[[], Header], ticks: TickFigures) -> SceneState | None:
-        """Continue to make the SceneState for about 200 µs: return None after each explanation, at last the message."""
+        """Continue to make the SceneState for about 500 µs: return None after each piece of work, at last the message.
+
+        Overlaps are worked out ten times a second.
+        """
         begun = self._begun
         if begun is None:
             return None
         for trigger in _TRIGGERS:
-            if trigger not in begun.explained:
-                begun.explained[trigger] = self._law.explain(trigger, begun.situation, begun.sensed)
+            if trigger not in begun.terms:
+                begun.terms[trigger] = self._law.explain(trigger, begun.situation, begun.sensed)
                 return None
-        self._begun = None
+            if trigger not in begun.overlaps_m3:
+                begun.overlaps_m3[trigger] = self._enlarged.overlaps_m3(trigger, begun.situation)
+                return None
+        self._begun, self._overlaps_m3 = None, begun.overlaps_m3
         return self._state(header(), begun, ticks)
 
     def _state(self, header: Header, begun: "_Begun", ticks: TickFigures) -> SceneState:
         objects, pose = begun.situation.objects, begun.situation.pose
-        l2, r2 = begun.explained["l2"], begun.explained["r2"]
-        touched = sorted(l2.overlaps_m3.keys() | r2.overlaps_m3.keys())
+        l2_m3, r2_m3 = begun.overlaps_m3["l2"], begun.overlaps_m3["r2"]
         return SceneState(
             header,
             version=begun.version,
@@ -140,10 +158,10 @@ class SceneView:
             tool_pose=_pose(pose.tool_position_m, pose.tool_rotation),
             spheres=_row_bytes(np.column_stack([pose.sphere_centers_m, pose.sphere_radii_m])),
             overlaps=tuple(
-                (thing, l2.overlaps_m3.get(thing, 0.0), r2.overlaps_m3.get(thing, 0.0)) for thing in touched
+                (thing, l2_m3.get(thing, 0.0), r2_m3.get(thing, 0.0)) for thing in sorted(l2_m3.keys() | r2_m3.keys())
             ),
-            l2=l2.terms,
-            r2=r2.terms,
+            l2=begun.terms["l2"],
+            r2=begun.terms["r2"],
             tick_p50_us=ticks.p50_us,
             tick_p99_us=ticks.p99_us,
             overruns=ticks.overruns,

@@ -1,7 +1,8 @@
-"""How exact are the law's onset distances, and how closely do spheres cover a gripper?
+"""How exact are the law's onset distances and the shared volume, and how closely do spheres cover a gripper?
 
 feelahead bench felt
 feelahead bench felt --cover
+feelahead bench felt --shared
 """
 
 from collections.abc import Iterator
@@ -19,6 +20,7 @@ from feelahead.lab.approaches.ticks import DEMO, record
 from feelahead.lab.cover import STANDS_OUT, Gripper, draw_cover, measure_cover
 from feelahead.lab.goals import Goal
 from feelahead.lab.reference.looks import LATE_M, compare, looks_of
+from feelahead.lab.shared import FIGURES, Shared, measure_shared, shared_cells
 from feelahead.lab.sweep import Question, Sweep
 from feelahead.lab.table import Row, Table
 from feelahead.printing.figures import shown
@@ -36,6 +38,8 @@ class FeltSweep(Sweep):
 
     cover: bool = False
     """Do this instead: measure how closely spheres cover grippers, of the built-in arm and of --model."""
+    shared: bool = False
+    """Do this instead: compare the volume that the inflated gripper shares with a thing with voxels, in 20 poses."""
     model: Annotated[tuple[Path, ...], tyro.conf.arg(metavar="FILE.xml...")] = ()
     """For --cover: MJCF files, each with an arm."""
     site: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None
@@ -49,6 +53,8 @@ class FeltSweep(Sweep):
             raise ValueError(f"--picture {self.picture}: errors have no figure; valid: with --cover")
         if bool(self.model) != (self.site is not None) or (self.model and not self.cover):
             raise ValueError("--model and --site are given without one another or --cover; valid: all three, or none")
+        if self.shared and self.cover:
+            raise ValueError("--shared and --cover are given; valid: one of them")
         for model in self.model:
             require_input_file("--model", model, "an MJCF file")
 
@@ -64,13 +70,15 @@ class Looked:
     """Scene whose stick deflections are used, instead of those of the run's own scene."""
 
 
-def cells(settings: FeltSweep) -> Iterator[Looked | Gripper]:
-    """Yield the cells that the flags choose: looks, or grippers."""
+def cells(settings: FeltSweep) -> Iterator[Looked | Gripper | Shared]:
+    """Yield the cells that the flags choose: looks, grippers, or poses."""
     if settings.cover:
         points = min(settings.points, _QUICK_POINTS) if settings.quick else settings.points
         yield Gripper("built-in", None, None, points)
         for model, name in scene_names(settings.model).items():
             yield Gripper(name, model, settings.site, points)
+    elif settings.shared:
+        yield from shared_cells(quick=settings.quick)
     else:
         yield Looked(DEMO, 6.0, 200) if settings.quick else Looked(DEMO, 20.0, 2000)
         for scene in ("mug",) if settings.quick else (*AHEAD, *ASIDE, *PASSED):
@@ -79,17 +87,23 @@ def cells(settings: FeltSweep) -> Iterator[Looked | Gripper]:
                 yield Looked(scene, 3.0, 40, aside)
 
 
-def run(cell: Looked | Gripper, seed: int) -> Iterator[Row]:
-    """Run one cell: yield a row of errors of a recorded run's looks, or the rows of --cover."""
+def run(cell: Looked | Gripper | Shared, seed: int) -> Iterator[Row]:
+    """Run one cell: yield a row of errors of a recorded run's looks, or the rows of --cover or --shared."""
     if isinstance(cell, Looked):
         recorded = record(cell.scene, cell.duration_s, seed, ASIDE.get(cell.sticks_of))
         yield dict(compare(*looks_of(recorded, cell.most)).row())
+    elif isinstance(cell, Shared):
+        yield from measure_shared(cell, seed)
     else:
         yield from measure_cover(cell, seed)
 
 
 def show(settings: FeltSweep, table: Table) -> Iterator[Shown]:
-    """Yield the table of errors, or that of --cover."""
+    """Yield the table of errors, or that of --cover or --shared."""
+    if settings.shared:
+        poses = ((f"{row['thing']}, D {row['inflated_mm']:g} mm", *map(row.get, FIGURES)) for row in table)
+        yield shown("volume shared with the inflated gripper, beside voxels; Σ V_ij; a look", ("pose", *FIGURES), poses)
+        return
     if settings.cover:
         measures = ("geoms", "spheres", "sticks_out_mm", *STANDS_OUT, "gap_mm", "gap_kept_mm", "made_s")
         links = ((f"{row['gripper']}: {row['part']}", *map(row.get, measures)) for row in table)
@@ -101,7 +115,11 @@ def show(settings: FeltSweep, table: Table) -> Iterator[Shown]:
 
 
 def goals(settings: FeltSweep, table: Table) -> Iterator[Goal]:
-    """Yield the goals: how exact onset distances must be, and how closely spheres must cover their geoms."""
+    """Yield the goals: how exact distances and volumes must be, and how closely spheres must cover their geoms."""
+    if settings.shared:
+        allowed = [abs(row["off_mm3"]) / max(100.0, 0.01 * row["volume_mm3"]) for row in table]
+        yield Goal("shared volume off, as a share of 1 % or 100 mm³, whichever is more", max(allowed), 1.0)
+        return
     for (name,), rows in table.groups("gripper") if settings.cover else ():
         yield Goal(f"{name}: sticks out of its spheres, mm", max(rows.values("sticks_out_mm")), 0.0)
         yield Goal(f"{name}: spheres stand out, mm", max(rows.values("stands_out_mm")), _LIMIT_COVER_MM)
@@ -119,6 +137,6 @@ QUESTION = Question(
     show,
     lambda _, table, path: draw_cover(table, path),
     goals,
-    frozen=lambda settings: "" if settings.cover else frozen_hash(),
+    frozen=lambda settings: "" if settings.cover or settings.shared else frozen_hash(),
     failed=lambda row: row.get("late", 0) + row.get("out_of_band", 0) > 0,
 )

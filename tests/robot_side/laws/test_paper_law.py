@@ -22,6 +22,7 @@ from tests.helpers.field.situations import (
     FULL_SPEED_M_S,
     SIGMA_M,
     Senses,
+    inputs,
     moving,
     paper,
     situation,
@@ -71,13 +72,12 @@ def test_the_enlargement_is_as_printed() -> None:
 def test_the_overlap_is_the_total_of_all_spheres_and_objects() -> None:
     pose = free_pose([[0.0, 0.0, 0.0], [0.03, 0.0, 0.0]], [0.01, 0.02])
     scene = Scene().add().box([0.0, 0.0, 0.069], [0.2, 0.2, 0.05]).add(Role.TARGET).sphere([0.06, 0.0, 0.0], 0.02)
-    # As printed, the law ignores the gap between the fingers.
-    sensed = senses(isotropic=True).sense(pose, scene.objects(), gap_m=0.0)
+    found = inputs().total_overlap_m3(situation(pose, scene.objects()), SIGMA_M)
     radii = pose.sphere_radii_m + SIGMA_M
     box = np.array([[0.0, 0.0, 0.069]] * 2), np.tile(np.eye(3), (2, 1, 1)), np.array([[0.2, 0.2, 0.05]] * 2)
     with_box = sphere_box(pose.sphere_centers_m, radii, *box)
     with_ball = sphere_sphere(pose.sphere_centers_m, radii, np.array([[0.06, 0.0, 0.0]] * 2), np.full(2, 0.02))
-    assert sensed.overlap_m3 == pytest.approx(float(np.sum(with_box) + np.sum(with_ball)), rel=1e-9)
+    assert found == pytest.approx(float(np.sum(with_box) + np.sum(with_ball)), rel=1e-9)
 
 
 def test_the_stiffness_is_its_share_of_the_enlarged_gripper_in_eighths() -> None:
@@ -85,8 +85,9 @@ def test_the_stiffness_is_its_share_of_the_enlarged_gripper_in_eighths() -> None
     for gap_m in np.linspace(0.0, SIGMA_M, 60):
         pose = free_pose([[0.0, 0.0, 0.0], [0.0, 0.0, -0.2]], [RADIUS_M, 0.004])
         sensed = senses(isotropic=True).sense(pose, walls(float(gap_m)))
+        total_m3 = inputs().total_overlap_m3(situation(pose, walls(float(gap_m))), SIGMA_M)
         whole_m3 = ball_volume(RADIUS_M + SIGMA_M) + ball_volume(0.004 + SIGMA_M)
-        share = sensed.overlap_m3 / (SHARE * whole_m3)
+        share = total_m3 / (SHARE * whole_m3)
         assert 8.0 * sensed.r2.course_stiffness == round(8.0 * min(1.0, share))
         found.add(sensed.r2.course_stiffness)
     assert found == {strength / 8.0 for strength in range(9)}
@@ -133,16 +134,22 @@ def test_what_lies_beside_counts_for_neither_trigger() -> None:
     assert stiffness(senses(share=1e-5, isotropic=True).sense(ball_pose(), beside)) == (1.0, 1.0)
 
 
+_OF_A_BALL = 0.1
+"""f at which a ball that is overlapped by some millimetres gives some eighths"""
+
+
 @pytest.mark.parametrize(("gap_m", "limit_m"), [(0.008, 0.004), (0.1, SIGMA_M), (None, SIGMA_M)])
 def test_towards_the_target_a_fingers_sphere_grows_by_half_the_gap_at_most(gap_m: float | None, limit_m: float) -> None:
     pose = dataclasses.replace(ball_pose(), sphere_on_finger=np.array([True]))
     for role, grows_by_m in ((Role.TARGET, limit_m), (Role.OBSTACLE, SIGMA_M)):
         ahead = Scene().add(role).sphere([0.0, 0.0, RADIUS_M + 0.021], 0.02).objects()
-        law = paper(settings=PaperSettings(SHARE))
+        law = paper(settings=PaperSettings(_OF_A_BALL))
         sensed = Senses(law).sense(pose, ahead, gap_m=gap_m)
         ball = np.array([[0.0, 0.0, RADIUS_M + 0.021]]), np.array([0.02])
-        expected = sphere_sphere(pose.sphere_centers_m, np.array([RADIUS_M + grows_by_m]), *ball)
-        assert sensed.overlap_m3 == pytest.approx(float(expected[0]), rel=1e-9)
+        overlap_m3 = sphere_sphere(pose.sphere_centers_m, np.array([RADIUS_M + grows_by_m]), *ball)[0]
+        strength = round(8.0 * overlap_m3 / (_OF_A_BALL * ball_volume(RADIUS_M + SIGMA_M)))
+        assert stiffness(sensed) == (0.0, strength / 8.0)
+        assert 0 < strength < 8
         assert law.summary()["limited_by_gap"] == (grows_by_m < SIGMA_M)
 
 
@@ -169,7 +176,7 @@ def test_the_speed_is_that_along_r2() -> None:
 
 def test_what_is_ignored_or_held_overlaps_nothing() -> None:
     scene = Scene().add(Role.IGNORED).add(Role.SUPPORT).box([0.0, 0.0, 0.0], [0.1, 0.1, 0.1])
-    assert senses().sense(ball_pose(), scene.objects(), held=1).overlap_m3 == 0.0
+    assert senses().sense(ball_pose(), scene.objects(), held=1).r2.course_stiffness == 0.0
     # To the paper's law a support is like any other object.
     assert senses().sense(ball_pose(), scene.objects()).r2.course_stiffness == 1.0
 
@@ -179,7 +186,7 @@ def test_it_looks_a_hundred_times_a_second() -> None:
     here, there = walls(0.1), walls(0.0)
     for tick in range(100):
         sensed = law.sense(situation(ball_pose(), here if tick < 55 else there), 7.0 + 0.001 * tick)
-        assert (sensed.overlap_m3 > 0.0) is (tick >= 60)
+        assert (sensed.r2.course_stiffness > 0.0) is (tick >= 60)
     assert law.summary() == {"fields": 10, "limited_by_gap": 0}
     assert PERIOD_S == 0.01
 

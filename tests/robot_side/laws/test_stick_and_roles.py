@@ -123,8 +123,7 @@ def test_the_held_object_is_no_danger_to_what_holds_it() -> None:
     whole = with_held(pose, grip(objects, 0, pose))
     carried = Senses().sense(whole, objects, held=0, gap_m=0.06, lateral=(1.0, 0.0))
     assert carried.r2.fast_m == carried.r2.slow_m == carried.l2.fast_m == (carried.horizon_m,) * 8
-    assert (carried.rumble, carried.overlap_m3) == (0.0, 0.0)
-    assert Senses().sense(whole, objects).overlap_m3 > 0.0
+    assert carried.rumble == 0.0
 
 
 def test_what_the_held_object_comes_near_is_felt() -> None:

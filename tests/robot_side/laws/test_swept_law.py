@@ -10,8 +10,7 @@ from common.arrays import FloatArray
 from common.reaction import HORIZON_S
 from robot_side.enlargement.prediction_errors import PredictionErrors
 from robot_side.laws.prospect import BEYOND_M
-from robot_side.overlap import sphere_box
-from tests.helpers.field.fields import AHEAD, RADIUS_M, ball_pose
+from tests.helpers.field.fields import AHEAD, ball_pose
 from tests.helpers.field.situations import (
     ACCELERATION_M_S2,
     EXACT,
@@ -128,7 +127,7 @@ def test_prediction_errors_are_those_of_the_predicting_side() -> None:
 # The figures of the summary
 
 
-def test_the_enlargement_and_the_overlap_by_hand() -> None:
+def test_the_enlargement_by_hand() -> None:
     velocity_m_s, loop_age_s = 0.2, 0.3
     for sign, ahead_m, behind_m in ((1.0, 0.05, None), (-1.0, None, 0.05)):
         senses = Senses()
@@ -137,13 +136,6 @@ def test_the_enlargement_and_the_overlap_by_hand() -> None:
             ball_pose(), walls(ahead_m, behind_m), joint_velocities_rad_s=velocity, loop_age_s=loop_age_s
         )
         assert sensed.enlargement_m == pytest.approx(loop_age_s * math.hypot(velocity_m_s, 0.05) + SIGMA_M)
-        moved = np.array([[0.0, 0.0, velocity_m_s * loop_age_s]])
-        wall = np.array([[0.0, 0.0, RADIUS_M + 0.05 + 0.05]]), np.eye(3)[None], np.array([[0.5, 0.5, 0.05]])
-        expected = sphere_box(moved, np.array([RADIUS_M + SIGMA_M]), *wall)[0]
-        assert expected > 1e-7
-        assert sensed.overlap_m3 == pytest.approx(expected, rel=1e-9)
-    still = Senses().sense(ball_pose(), walls(0.05), loop_age_s=loop_age_s)
-    assert still.overlap_m3 == 0.0
 
 
 # Impossible values

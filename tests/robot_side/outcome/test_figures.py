@@ -5,22 +5,25 @@ import pytest
 
 from common.protocol.uniform_field import uniform_field
 from common.roles import Role
+from robot_side.arm.port import ArmState
 from robot_side.outcome.figures import MOVING_M_S, RunFigures
+from robot_side.tick.events import Found, Tick
+from robot_side.tick.explained import Overlaps, Trigger
 from robot_side.tick.sensed import Sensed
+from robot_side.tick.situation import Situation
 from robot_side.tick.truth import Truth
+from tests.helpers.field.situations import situation
+from tests.helpers.gripper_poses import gripper_pose
 
 ROLES = {"post": Role.OBSTACLE, "cup": Role.TARGET, "table": Role.SUPPORT}
 
 
-def sensed(
-    enlargement_m: float, overlap_m3: float = 0.0, l2: int = 0, r2: int = 0, tool_speed_m_s: float = 0.0
-) -> Sensed:
+def sensed(enlargement_m: float, l2: int = 0, r2: int = 0, tool_speed_m_s: float = 0.0) -> Sensed:
     return Sensed(
         l2=uniform_field(l2),
         r2=uniform_field(r2),
         horizon_m=0.2,
         enlargement_m=enlargement_m,
-        overlap_m3=overlap_m3,
         tool_speed_m_s=tool_speed_m_s,
     )
 
@@ -47,13 +50,12 @@ def test_what_was_never_seen_is_none_and_only_counts_are_0() -> None:
 
 def test_figures_are_in_the_units_of_their_names() -> None:
     figures = RunFigures()
-    figures.tick(sensed(0.030, 2e-6, l2=1, r2=8))
-    figures.tick(sensed(0.050, 4e-6, l2=3, r2=4))
-    figures.tick(sensed(0.509, 3e-6, l2=2, r2=6), settled=False)
+    figures.tick(sensed(0.030, l2=1, r2=8))
+    figures.tick(sensed(0.050, l2=3, r2=4))
+    figures.tick(sensed(0.509, l2=2, r2=6), settled=False)
     summary = figures.summary()
     assert summary["ticks"] == 3
     assert summary["enlargement_mm"] == pytest.approx({"min": 30.0, "mean": 40.0, "max": 50.0, "mean_moving": None})
-    assert summary["overlap_mm3"] == pytest.approx({"max": 4000.0, "mean": 3000.0})
     assert summary["stiffness"]["l2"] == pytest.approx({"mean": 0.25, "max": 0.375})
     assert summary["stiffness"]["r2"] == pytest.approx({"mean": 0.75, "max": 1.0})
 
@@ -61,11 +63,11 @@ def test_figures_are_in_the_units_of_their_names() -> None:
 @pytest.mark.parametrize("asked_every", [1, 100, 10_000])
 def test_figures_of_many_ticks_are_those_of_each(asked_every: int) -> None:
     generator = np.random.default_rng(0)
-    enlargements, overlaps = generator.uniform(0.0, 0.1, (2, 5000))
+    enlargements = generator.uniform(0.0, 0.1, 5000)
     speeds = generator.choice([0.0, MOVING_M_S, 0.25], 5000)
     figures = RunFigures()
-    for enlargement_m, overlap_m3, speed_m_s in zip(enlargements, overlaps, speeds, strict=True):
-        figures.tick(sensed(float(enlargement_m), float(overlap_m3), tool_speed_m_s=float(speed_m_s)), armed=False)
+    for enlargement_m, speed_m_s in zip(enlargements, speeds, strict=True):
+        figures.tick(sensed(float(enlargement_m), tool_speed_m_s=float(speed_m_s)), armed=False)
         if figures.ticks % asked_every == 0:
             figures.on_sent(0.0)
     summary = figures.summary()
@@ -75,7 +77,29 @@ def test_figures_of_many_ticks_are_those_of_each(asked_every: int) -> None:
     assert summary["enlargement_mm"]["mean_moving"] == pytest.approx(
         1e3 * np.mean(enlargements[speeds > 0.01]), rel=1e-12
     )
-    assert summary["overlap_mm3"]["mean"] == pytest.approx(1e9 * np.mean(overlaps), rel=1e-12)
+
+
+class Growing:
+    """Enlarged gripper whose overlap is its loop age, 1 mm³ for each ms."""
+
+    def overlaps_m3(self, trigger: Trigger, situation: Situation) -> Overlaps:
+        raise AssertionError(f"{trigger}, {situation.loop_age_s} s: only the total is a figure")
+
+    def overlap_m3(self, situation: Situation) -> float:
+        return 1e-6 * situation.loop_age_s
+
+
+def test_the_overlap_is_worked_out_ten_times_a_second_once_the_loop_age_is_known() -> None:
+    figures, state = RunFigures(enlarged=Growing()), ArmState(0.0, np.zeros(6), np.zeros(6), np.zeros(2), 0.0, False)
+    for tick in range(101):
+        now_s = 7.0 + 0.004 * tick
+        here = situation(gripper_pose(), loop_age_s=0.004 * tick, loop_age_known=tick >= 25)
+        found = Found("armed", None, state, here, sensed(0.0), False, None)
+        figures.on_tick(Tick(now_s, state, None, 0.0, (), found))
+        figures.on_sent(now_s)
+        assert (figures.overlap_m3 is None) is (tick < 25)
+    assert figures.overlap_m3 == pytest.approx(4e-7)
+    assert figures.summary()["overlap_mm3"] == pytest.approx({"max": 400.0, "mean": 250.0})
 
 
 @pytest.mark.parametrize("wrong", [np.nan, np.inf])

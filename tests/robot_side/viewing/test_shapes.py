@@ -28,7 +28,9 @@ def looked_at(settings: RobotSettings, scene: Scene | None = None) -> tuple[Robo
     parts = build_parts(settings, 1, "clock", scene=scene)
     robot = RobotSide(parts)
     robot.tick(0.0)
-    return robot, SceneView(SceneModel(parts.scene), parts.kinematics, parts.explains, parts.surroundings)
+    return robot, SceneView(
+        SceneModel(parts.scene), parts.kinematics, parts.explains, parts.enlarged, parts.surroundings
+    )
 
 
 def shapes_of(robot: RobotSide, view: SceneView) -> SceneShapes:

@@ -3,6 +3,7 @@
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import replace
+from statistics import NormalDist
 
 import numpy as np
 import pytest
@@ -10,9 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from common.arrays import FloatArray
 from common.emulation.spec import LinkSpec
-from robot_side.laws.paper import PaperLaw
-from robot_side.laws.swept import SweptLaw
-from robot_side.parts import build_parts
+from common.protocol.messages import Tune
 from robot_side.settings import CameraSettings, RobotSettings
 from tests.robot_side.viewing.view_table import TABLES, Table
 
@@ -196,10 +195,10 @@ def test_a_state_says_where_the_robot_side_believes_everything_is(law: str) -> N
 
 
 @pytest.mark.parametrize("law", ["swept", "paper"])
-def test_overlaps_add_up_to_the_total_that_the_law_has(law: str) -> None:
-    table = Table(RobotSettings(camera=CameraSettings(mean_m=-0.01), law=law))
+def test_overlaps_add_up_to_the_figure_of_the_run_under_any_law(law: str) -> None:
+    table = Table(RobotSettings(camera=CameraSettings(mean_m=-0.01), law=law, permit_tuning=True))
     table.run(0.1)
-    core = table.robot
+    core, parts = table.robot, table.parts
     assert core.newest is not None
     sensed, situation = core.newest
     # Among objects, with a known delay, moving: something is met within a tenth of a second.
@@ -207,14 +206,18 @@ def test_overlaps_add_up_to_the_total_that_the_law_has(law: str) -> None:
     there = replace(pose, sphere_centers_m=pose.sphere_centers_m + np.array([0.2, 0.02, -0.17]))
     velocities = np.linalg.pinv(pose.tool_jacobian) @ [0.1, 0.0, 0.0, 0.0, 0.0, 0.0]
     moving = replace(situation, pose=there, loop_age_known=True, loop_age_s=0.3, joint_velocities_rad_s=velocities)
-    law_anew = build_parts(table.settings, 1, "clock").explains
-    assert isinstance(law_anew, SweptLaw | PaperLaw)
-    sensed = law_anew.sense(moving, 10.0)
-    assert sensed.overlap_m3 > 1e-6
-    l2, r2 = law_anew.explain("l2", moving, sensed), law_anew.explain("r2", moving, sensed)
-    assert len(r2.overlaps_m3) > 1
-    assert sum(r2.overlaps_m3.values()) == pytest.approx(sensed.overlap_m3, rel=1e-6)
-    assert r2.terms.displacement_m == pytest.approx(0.03, rel=1e-3)
+    total_m3 = parts.enlarged.overlap_m3(moving)
+    l2_m3, r2_m3 = parts.enlarged.overlaps_m3("l2", moving), parts.enlarged.overlaps_m3("r2", moving)
+    assert total_m3 > 1e-6
+    assert len(r2_m3) > 1
+    assert sum(r2_m3.values()) == pytest.approx(total_m3, rel=1e-9)
+    # Another P reaches the law and the figure.
+    assert parts.session.tuning.grant(Tune(table.end.stamp(0.2), 1, probability=0.6), 0.2, owns=True)
+    assert parts.enlarged.overlap_m3(moving) < 0.9 * total_m3
+    sensed = parts.law.sense(moving, 10.0)
+    l2, r2 = (parts.explains.explain(trigger, moving, sensed) for trigger in ("l2", "r2"))
+    assert r2.quantile == pytest.approx(NormalDist().inv_cdf(0.6))
+    assert r2.displacement_m == pytest.approx(0.03, rel=1e-3)
     if law == "swept":
-        assert sum(l2.overlaps_m3.values()) != pytest.approx(sensed.overlap_m3, rel=1e-3)
-        assert max(r2.terms.sigma_m, l2.terms.sigma_m) > 0.0
+        assert sum(l2_m3.values()) != pytest.approx(total_m3, rel=1e-3)
+        assert max(r2.sigma_m, l2.sigma_m) > 0.0

@@ -45,7 +45,11 @@ class Table:
             for stream in ("haptics", "telemetry", "video", "scene")
         }
         view = SceneView(
-            SceneModel(self.parts.scene), self.parts.kinematics, self.parts.explains, self.parts.surroundings
+            SceneModel(self.parts.scene),
+            self.parts.kinematics,
+            self.parts.explains,
+            self.parts.enlarged,
+            self.parts.surroundings,
         )
         self.looking = ViewScheduler(self.robot.session, view, self.desk.cameras, self, always=self.always)
         self.end = LinkEnd("operator", 5, "clock")
