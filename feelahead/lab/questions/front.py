@@ -21,12 +21,11 @@ from feelahead.lab.approaches.approach import Approach, PullRun, compile_kernels
 from feelahead.lab.approaches.evaluation import LINKS, Placement, Pulls, evaluate
 from feelahead.lab.approaches.frozen import frozen_hash, frozen_scene
 from feelahead.lab.approaches.laws import TriedLaw, paper_figures, with_papers
-from feelahead.lab.approaches.pulls import PullKind, make_pull
+from feelahead.lab.approaches.pulls import PullKind
 from feelahead.lab.figures import colour_of, figure
 from feelahead.lab.sweep import Question, Sweep
 from feelahead.lab.table import Row, Table
 from feelahead.printing.figures import shown
-from operator_side.people.port import Pulling
 from robot_side.laws.paper_settings import EnlargementTime, PaperSettings, Share
 
 LAWS: Final = ("paper", "paper-isotropic", "swept", "none")
@@ -58,8 +57,8 @@ _VARIANT: Final = ("law", "enlargement")
 class FrontSettings(Sweep):
     """Find the share f of the paper's law, by contacts against false alarms and time, beside `swept` and `none`.
 
-    A finger of 2 N, and a quick hand, pull R2 towards objects, and past them. Other pulls are recorded without haptics
-    and judged, as by `bench coverage` at P = 0.9. f is chosen on some scenes, for the most of: share of contacts
+    A finger of 2 N pulls R2 towards objects, and past them. Other pulls, steady and quick ones, are recorded without
+    haptics and judged, as by `bench coverage` at P = 0.9. f is chosen on some scenes, for the most of: share of contacts
     prevented, minus share of the pulled time with a false alarm. Equal ones: the larger f. Then it is tried on the
     scenes kept apart.
     --quick: three f, few scenes and links.
@@ -88,19 +87,13 @@ class FrontSettings(Sweep):
         return tuple(PaperSettings(share, when) for when, share in product(self.enlargements, shares))
 
 
-Hand = Literal["2 N", "bells"]
-HANDS: Final[tuple[Hand, ...]] = "2 N", "bells"
-"""A finger of 2 N, and one that pulls as an aiming hand moves, up to full travel, with rests between (`make_pull`)"""
-
-
 @dataclass(frozen=True)
 class Pull:
-    """Pull that feels one law."""
+    """Steady pull of 2 N that feels one law."""
 
     group: Group
     scene: str
     link: str
-    hand: Hand
     law: TriedLaw
     paper: PaperSettings | None
     passes: bool
@@ -124,11 +117,10 @@ def cells(settings: FrontSettings) -> Iterator[Pull | Judging]:
         yield Judging(group, Pulls(pull, link, "empty", placed, (6, 4), (_PROBABILITY,), LAWS, papers, _JUDGED_S))
     for group, (law, paper) in product(GROUPS, with_papers(LAWS, papers)):
         links = settings.links[1:2] if settings.quick else settings.links
-        for scene, hand in product(_AHEAD[group][:few], HANDS):
-            felt = links if hand == "2 N" else [link for link in links if link != "0 ms"]
-            yield from (Pull(group, scene, link, hand, law, paper, passes=False) for link in felt)
+        for scene, link in product(_AHEAD[group][:few], links):
+            yield Pull(group, scene, link, law, paper, passes=False)
         for scene in _PASSED[group][:few]:
-            yield Pull(group, scene, "200 ms", "2 N", law, paper, passes=True)
+            yield Pull(group, scene, "200 ms", law, paper, passes=True)
 
 
 def run(cell: Pull | Judging, seed: int) -> Iterator[Row]:
@@ -145,8 +137,7 @@ def run(cell: Pull | Judging, seed: int) -> Iterator[Row]:
         duration_s=_DURATION_S,
         seed=seed,
     )
-    person = Pulling(make_pull("bell", seed)) if cell.hand == "bells" else None
-    yield paper_figures(cell.paper) | pulled(PullRun(approach, person))
+    yield paper_figures(cell.paper) | pulled(PullRun(approach))
 
 
 def pulled(pull: PullRun) -> Row:
@@ -194,7 +185,7 @@ def points(table: Table, group: Group) -> Table:
 
 
 def _place(row: Row) -> tuple[Any, ...]:
-    return row["scene"], row.get("link"), row.get("hand"), row.get("passes"), row["seed"]
+    return row["scene"], row.get("link"), row.get("passes"), row["seed"]
 
 
 def _gone_s(row: Row) -> float:
@@ -275,7 +266,7 @@ def _curve(axes: Any, rows: Sequence[Row], name: str, law: str, when: Enlargemen
         label=label,
         **style,
     )
-    for row in rows:
+    for row in rows if law == "paper" else ():  # those of the isotropic form are in the same order, and nearly as high
         if row["share"] is not None:
             axes.annotate(
                 f"{row['share']:g}",
