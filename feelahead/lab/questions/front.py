@@ -58,9 +58,9 @@ class FrontSettings(Sweep):
     """Find the share f of the paper's law, by contacts against false alarms and time, beside `swept` and `none`.
 
     A finger of 2 N pulls R2 towards objects, and past them. Other pulls, steady and quick ones, are recorded without
-    haptics and judged, as by `bench coverage` at P = 0.9. f is chosen on some scenes, for the most of: share of contacts
-    prevented, minus share of the pulled time with a false alarm. Equal ones: the larger f. Then it is tried on the
-    scenes kept apart.
+    haptics and judged, as by `bench coverage` at P = 0.9. f is chosen on some scenes, for the most of: share of
+    contacts prevented, minus share of the pulled time with a false alarm. Equal ones: the larger f. Then it is tried on
+    the scenes kept apart.
     --quick: three f, few scenes and links.
     """
 
