@@ -16,6 +16,8 @@ from common.timing.clock_offset import ClockOffset
 _GAP_S = 0.1
 _REMEMBERED_EPOCHS = 64
 """Number of the peer's ended epochs that are remembered, and so refused; older ones are forgotten to bound memory."""
+_REMEMBERED_NUMBERS = 1024
+"""Number of sequence numbers, up to the newest of a kind, of which is known whether they came: 2 to 4 s."""
 _MOST_RECENT = 4096
 """Maximum number of arrivals in `recent`; enough for the last second."""
 
@@ -34,7 +36,29 @@ class Arrival:
     """Loop age in seconds: round trip of the echoed stamp, plus the counted part of the time for which the peer held
     that stamp (common/silence.py). None if the message echoes no valid stamp."""
     copy: bool = False
-    """Whether the message is a duplicate of the newest of its kind, received over another connection."""
+    """Whether the message came before, over another connection; known of the newest 1024 numbers of its kind."""
+
+
+@dataclass
+class _Numbers:
+    """Sequence numbers of one kind that came: the newest, and which before it."""
+
+    newest: int = 0
+    came: int = 1
+    """Bit i: whether number `newest` - i came"""
+
+    def note(self, sequence: int) -> tuple[bool, bool]:
+        """Note that `sequence` came; return whether it is newer than all before, and whether it came before."""
+        ahead = sequence - self.newest
+        if ahead > 0:
+            # An invented number may be very far ahead.
+            kept = self.came << ahead if ahead < _REMEMBERED_NUMBERS else 0
+            self.newest, self.came = sequence, kept % (1 << _REMEMBERED_NUMBERS) | 1
+            return True, False
+        came_before = bool(self.came >> -ahead & 1)
+        if -ahead < _REMEMBERED_NUMBERS:
+            self.came |= 1 << -ahead
+        return False, came_before
 
 
 class LinkEnd:
@@ -86,7 +110,7 @@ class LinkEnd:
         self._jumps = 0
         self.outgoing.reset()
         self._queueing = QueueingAge()
-        self._newest_of_kind: dict[type, int] = {}
+        self._numbers_of_kind: dict[type, _Numbers] = {}
         self._newest: Header | None = None
         self._newest_received_s = 0.0
         self._last_sent_s = self._last_received_s = 0.0
@@ -144,10 +168,7 @@ class LinkEnd:
             self.gaps += self._newest is not None and now_s - self._newest_received_s > _GAP_S
             self._newest, self._newest_received_s = header, now_s
         self._last_sent_s, self._last_received_s = header.sent_s, now_s
-        newest = self._newest_of_kind.get(type(message), 0)
-        fresh, copy = header.sequence > newest, header.sequence == newest
-        if fresh:
-            self._newest_of_kind[type(message)] = header.sequence
+        fresh, copy = self._numbers_of_kind.setdefault(type(message), _Numbers()).note(header.sequence)
         self.stale += not fresh and not copy
         return Arrival(fresh, queueing_age_s, one_way_s, loop_age_s, copy)
 

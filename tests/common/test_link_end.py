@@ -52,9 +52,24 @@ def test_a_copy_is_measured_and_neither_fresh_nor_stale_and_what_was_overtaken_i
         assert copy.one_way_s == 0.06 - message.header.sent_s
     assert (robot.stale, robot.delay.count) == (0, 6)
     assert robot.delay.mean == pytest.approx(0.045)
-    for stale in (1, 2):
-        assert not robot.arrived(opening, 0.07).fresh
-        assert (robot.stale, robot.delay.count) == (stale, 6 + stale)
+    overtaken = motion(operator.stamp(0.03))
+    robot.arrived(motion(operator.stamp(0.04)), 0.07)
+    # Over several connections with jitter, a copy may come long after newer messages, and before or after the first.
+    for message, came_before in ((opening, True), (overtaken, False), (overtaken, True)):
+        arrival = robot.arrived(message, 0.08)
+        assert (arrival.fresh, arrival.copy) == (False, came_before)
+    assert robot.stale == 1
+
+
+def test_copies_are_known_up_to_a_distance_and_an_invented_number_costs_nothing() -> None:
+    robot, operator = ends()
+    robot.arrived(operator.hello(0.0), 0.0)
+    first = motion(operator.stamp(0.0, 2))
+    for ahead_by in (1023, 1024, 2**50):
+        assert robot.arrived(first, 0.0).copy == (ahead_by == 1024)
+        assert robot.arrived(motion(operator.stamp(0.0, 2 + ahead_by)), 0.0).fresh
+    assert not robot.arrived(first, 0.0).copy
+    assert robot.arrived(motion(operator.stamp(0.0, 2 + 2**50)), 0.0).copy
 
 
 def test_an_epoch_that_ended_never_comes_back() -> None:
