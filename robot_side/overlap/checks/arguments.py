@@ -1,7 +1,9 @@
 """Checks of the public functions' arguments, and their broadcasting against each other."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from types import EllipsisType
 
 import numpy as np
 import numpy.typing as npt
@@ -16,6 +18,9 @@ SMALLEST_NORMAL = 1e-50
 
 ORTHONORMALITY = 1e-6
 """Largest valid Frobenius norm of QᵀQ - I for a rotation matrix Q"""
+
+Index = tuple[int | slice, ...] | EllipsisType
+"""Part of an array's leading dimensions"""
 
 
 @dataclass(frozen=True)
@@ -49,10 +54,11 @@ class Argument:
 
     def rows(self, shape: tuple[int, ...]) -> FloatArray:
         """Return the items broadcast to the leading dimensions `shape`, in one contiguous array (items, *trailing)."""
-        if self.leading == shape:
-            return self.items
-        repeated = np.broadcast_to(self.values, (*shape, *self.trailing))
-        return np.ascontiguousarray(repeated).reshape(int(np.prod(shape, dtype=np.int64)), *self.trailing)
+        return self.items if self.leading == shape else self.block(shape, ...).items
+
+    def block(self, shape: tuple[int, ...], block: Index) -> "Argument":
+        """Return the part `block` of this argument as broadcast to the leading dimensions `shape`; copies nothing."""
+        return replace(self, values=np.broadcast_to(self.values, (*shape, *self.trailing))[block])
 
 
 Check = Callable[[str, npt.ArrayLike, tuple[int, ...]], Argument]
@@ -136,6 +142,15 @@ def broadcast(arguments: Sequence[Argument]) -> tuple[int, ...]:
         raise ValueError(
             f"the arguments' leading dimensions do not broadcast: {shapes}; valid: equal ones, or 1"
         ) from error
+
+
+def blocks(shape: tuple[int, ...], most: int) -> Iterator[tuple[int | slice, ...]]:
+    """Yield the parts of an array of `shape` that together are the whole, each of at most `most` >= 1 numbers."""
+    axis = next(i for i in range(len(shape)) if math.prod(shape[i + 1 :]) <= most)
+    step = most // max(math.prod(shape[axis + 1 :]), 1)
+    for outer in np.ndindex(shape[:axis]):
+        for first in range(0, shape[axis], step):
+            yield (*outer, slice(first, first + step))
 
 
 def _shape_text(trailing: tuple[int, ...]) -> str:

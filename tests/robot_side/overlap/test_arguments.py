@@ -1,6 +1,7 @@
 """Arguments of the public functions: shapes, broadcasting and errors; and those of the unchecked kernels."""
 
 import re
+import tracemalloc
 from collections.abc import Callable
 from typing import Any
 
@@ -9,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robot_side.overlap import kernels, sphere_box, sphere_half_space, sphere_sphere, sphere_tetrahedron
+from robot_side.overlap import kernels, sphere_box, sphere_half_space, sphere_sphere, sphere_tetrahedron, volumes
 
 CORNER = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
 
@@ -49,16 +50,16 @@ def changed(kind: str, name: str, value: object) -> Callable[[], Any]:
 @pytest.mark.parametrize("kind", CALLS)
 def test_results_have_the_leading_dimensions(kind: str) -> None:
     function, arguments = CALLS[kind]
-    volumes = function(**arguments)
-    assert volumes.shape == (2,)
-    assert volumes.dtype == np.float64
+    found = function(**arguments)
+    assert found.shape == (2,)
+    assert found.dtype == np.float64
     with_gradient = function(**arguments, gradient=True)
     assert [result.shape for result in with_gradient] == [(2,), (2, 3), (2,)]
-    np.testing.assert_array_equal(with_gradient[0], volumes)
+    np.testing.assert_array_equal(with_gradient[0], found)
 
     one = function(**{name: value[0] for name, value in arguments.items()})
     assert one.shape == ()
-    assert one == volumes[0]
+    assert one == found[0]
     none = function(**{name: value[:0] for name, value in arguments.items()}, gradient=True)
     assert [result.shape for result in none] == [(0,), (0, 3), (0,)]
 
@@ -76,6 +77,32 @@ def test_leading_dimensions_broadcast(kind: str) -> None:
             single |= {"centers": centers[row, 0], "radii": radii[row, 0]}
             for result, expected in zip(table, function(**single, gradient=True), strict=True):
                 np.testing.assert_array_equal(result[row, column], expected)
+
+
+@pytest.mark.parametrize("kind", CALLS)
+@pytest.mark.parametrize("most", [1, 4, 6, 29, 59])
+def test_many_pairs_are_overlapped_in_blocks(kind: str, most: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    function, arguments = CALLS[kind]
+    rng = np.random.default_rng(6)
+    spheres = {"centers": 0.3 * rng.normal(size=(5, 3, 1, 2, 3)), "radii": rng.uniform(0.5, 1.0, (1, 2, 1))}
+    whole = function(**{**arguments, **spheres}, gradient=True)
+    assert whole[0].shape == (5, 3, 2, 2)
+    monkeypatch.setattr(volumes, "MOST_AT_ONCE", most)
+    for result, expected in zip(function(**{**arguments, **spheres}, gradient=True), whole, strict=True):
+        np.testing.assert_array_equal(result, expected)
+    np.testing.assert_array_equal(function(**{**arguments, **spheres}), whole[0])
+    plain = {name: np.repeat(value[:1], 60, axis=0) for name, value in arguments.items()}
+    np.testing.assert_array_equal(function(**plain), np.full(60, function(**arguments)[0]))
+
+
+def test_memory_grows_with_the_results_alone() -> None:
+    others = np.random.default_rng(7).normal(size=(2, 2000, 3))
+    sphere_sphere(others[0], 0.1, others[1], 0.1)
+    tracemalloc.start()
+    volumes_m3 = sphere_sphere(others[0, :, None], 0.1, others[1], 0.1)
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert peak < volumes_m3.nbytes + 40e6
 
 
 @given(st.sampled_from(ARGUMENTS), st.integers(1, 150), st.data())
