@@ -21,6 +21,7 @@ lengths = st.floats(0.0, 1.0)
 def test_distance_is_the_quantile_of_the_standard_library(p: float, mean: float, sd: float, delay: float) -> None:
     expected = delay + max(0.0, NormalDist(mean, sd).inv_cdf(p))
     assert enlargement_distance(p, mean, sd**2, delay) == pytest.approx(expected, rel=1e-9, abs=1e-9)
+    assert enlargement_distance(p, [mean], sd**2, delay) == pytest.approx(np.array([expected]), rel=1e-9, abs=1e-9)
     assert Uncertainty(p).quantile == pytest.approx(NormalDist().inv_cdf(p), rel=1e-9, abs=1e-12)
 
 
