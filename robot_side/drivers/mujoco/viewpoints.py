@@ -18,9 +18,6 @@ if TYPE_CHECKING:
 Triple = tuple[float, float, float]
 
 _OVERVIEW = "overview"
-_DOWN_DEG, _ASIDE_DEG = 55.0, 20.0
-"""Angles of the overview, in degrees. It looks down over the arm's shoulder: ahead is up in the picture, and the arm
-hides little."""
 _SHORTEST_REACH_M = 0.3
 _LEAST_ALONG = 0.5
 """Cosine of the largest angle, 60°, between the approach axis and the line of sight of a camera that shows it"""
@@ -101,21 +98,17 @@ def _yaw_rad(scene: Scene) -> float:
 
 
 def _overview(scene: Scene) -> Viewpoint:
+    """Return the model's camera of that name, else a viewpoint that looks straight down, with ahead up (§4.3)."""
     model, data, robot = scene.model, scene.data, scene.robot
     for camera in range(model.ncam):
         if model.camera(camera).name.rpartition("/")[2] == _OVERVIEW:
             return Viewpoint(camera=camera)
     base_m, tool_m = data.xpos[robot.root_body], data.site_xpos[robot.site]
     reach_m, yaw = _reach_m(scene), _yaw_rad(scene)
-    looked_at_m = np.array([*tool_m[:2], 0.5 * (base_m[2] + tool_m[2])])
-    looked_at_m[:2] += 0.1 * reach_m * np.array([np.cos(yaw), np.sin(yaw)])
-    down, around = np.radians(_DOWN_DEG), yaw + np.radians(_ASIDE_DEG)
-    across = np.array([np.cos(around), np.sin(around), 0.0])
-    forward = np.cos(down) * across - np.sin(down) * np.array([0.0, 0.0, 1.0])
-    up = np.sin(down) * across + np.cos(down) * np.array([0.0, 0.0, 1.0])
-    return Viewpoint(
-        position_m=_triple(looked_at_m - 2.3 * reach_m * forward), forward=_triple(forward), up=_triple(up)
-    )
+    ahead = np.array([np.cos(yaw), np.sin(yaw), 0.0])
+    looked_at_m = np.array([*tool_m[:2], 0.5 * (base_m[2] + tool_m[2])]) + 0.1 * reach_m * ahead
+    position_m = looked_at_m + np.array((0.0, 0.0, 2.3 * reach_m))
+    return Viewpoint(position_m=_triple(position_m), forward=(0.0, 0.0, -1.0), up=_triple(ahead))
 
 
 def _first_person(scene: Scene) -> Viewpoint:

@@ -33,7 +33,9 @@ def test_the_overview_shows_tool_base_and_what_is_ahead(built_in: bool, tmp_path
         assert 0.1 * WIDTH < column < 0.9 * WIDTH
     # From above, with ahead upwards.
     assert project(scene, overview, ahead_m)[0] < project(scene, overview, tool.xpos)[0]
-    assert overview.forward[2] < -0.7
+    assert overview.forward == (0.0, 0.0, -1.0)
+    yaw = np.arctan2(*(tool.xpos - scene.data.xpos[scene.robot.root_body])[[1, 0]])
+    assert overview.up == pytest.approx((np.cos(yaw), np.sin(yaw), 0.0))
 
 
 def test_the_first_person_is_behind_the_palm_and_beside_it(tmp_path: Path) -> None:
