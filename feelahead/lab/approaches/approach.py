@@ -83,8 +83,10 @@ class Approach:
 class PullRun(Listener):
     """Both sides, their link and a hand that pulls R2; the run can be advanced in steps."""
 
-    def __init__(self, approach: Approach, person: Person | None = None) -> None:
-        """Build both sides in the scene. person: who pulls, instead of the constant force."""
+    def __init__(
+        self, approach: Approach, person: Person | None = None, device: SimulatedDualSense | None = None
+    ) -> None:
+        """Build both sides in the scene. person: who pulls, instead of the constant force. device: other triggers."""
         self.approach = approach
         self.onset: ContactOnset | None = None
         """First contact since the pull began; None before it."""
@@ -101,7 +103,7 @@ class PullRun(Listener):
             tick_period=approach.tick_period,
         )
         kind = FullDualSense if approach.law == "full" else SimulatedDualSense
-        device = kind(strength_step_n=approach.strongest_n / MAX_STRENGTH)
+        device = device or kind(strength_step_n=approach.strongest_n / MAX_STRENGTH)
         pulls = person or constant_force(approach.force_n, approach.stick, approach.turn)
         self.hands = ArmingHands(device, pulls, grip=approach.grip)
         self.episode = Episode(

@@ -20,7 +20,12 @@ from operator_side.dualsense.reports.input_report import build_input_report, par
 from operator_side.dualsense.reports.models import Model
 from operator_side.dualsense.reports.output_report import parse_output_report, transport_of_output
 from operator_side.dualsense.reports.transport import Transport
-from operator_side.dualsense.simulated.trigger_model import STRENGTH_STEP_N, SimulatedTrigger, zone_of
+from operator_side.dualsense.simulated.trigger_model import (
+    FINGER_TIME_CONSTANT_S,
+    STRENGTH_STEP_N,
+    SimulatedTrigger,
+    zone_of,
+)
 
 INPUT_REPORT_PERIOD_S: Final = 0.004
 """Period of input reports, in seconds: about 250 a second, as on USB (SDL)"""
@@ -54,16 +59,17 @@ class SimulatedDualSense:
         *,
         address: str = SIMULATED_ADDRESS,
         strength_step_n: float = STRENGTH_STEP_N,
+        finger_s: float = FINGER_TIME_CONSTANT_S,
     ) -> None:
         """strength_step_n: force that each step of strength, 0 to 8, adds to a trigger's resistance.
 
-        ValueError for an invalid address.
+        finger_s: time constant of the fingers on the triggers, above 0. ValueError for an invalid address.
         """
         self.transport: Final = transport
         self.model: Final = model
         self.address: Final = address
-        self._l2 = SimulatedTrigger(strength_step_n)
-        self._r2 = SimulatedTrigger(strength_step_n)
+        self._l2 = SimulatedTrigger(strength_step_n, finger_s)
+        self._r2 = SimulatedTrigger(strength_step_n, finger_s)
         wireless = transport is Transport.BLUETOOTH
         self._held = ControllerState(battery=Battery(0.95, BatteryState.DISCHARGING) if wireless else Battery())
         self._features = {

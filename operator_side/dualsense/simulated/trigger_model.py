@@ -57,13 +57,19 @@ class SimulatedTrigger:
     steps give the same travel, except for rounding.
     """
 
-    def __init__(self, strength_step_n: float = STRENGTH_STEP_N) -> None:
-        """strength_step_n: force that each step of strength adds; with 0, effects are stored but not felt."""
+    def __init__(
+        self, strength_step_n: float = STRENGTH_STEP_N, time_constant_s: float = FINGER_TIME_CONSTANT_S
+    ) -> None:
+        """strength_step_n: force that each step of strength adds; with 0, effects are stored but not felt.
+
+        time_constant_s: the finger's, above 0.
+        """
         self.strengths = FREE_TRIGGER
         """Present strengths of the zones; `set_strengths` changes them."""
         self.travel = 0.0
         """Present mechanical travel, 0 to 1."""
         self._strength_step_n = strength_step_n
+        self._time_constant_s = time_constant_s
         self._finger_force_n = 0.0
         self._equilibrium = 0.0
 
@@ -86,5 +92,5 @@ class SimulatedTrigger:
         """Move the trigger during `step_s`; ValueError for a negative or non-finite step."""
         if not (math.isfinite(step_s) and step_s >= 0.0):
             raise ValueError(f"step_s = {step_s}; valid: finite, 0 or more")
-        remaining = math.exp(-step_s / FINGER_TIME_CONSTANT_S)
+        remaining = math.exp(-step_s / self._time_constant_s)
         self.travel = self._equilibrium + (self.travel - self._equilibrium) * remaining

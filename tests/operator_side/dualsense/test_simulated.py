@@ -1,3 +1,4 @@
+import math
 from typing import Any
 
 import pytest
@@ -163,3 +164,12 @@ def used(what: str, *arguments: Any, **named: Any) -> Any:
 def test_refusals(what: str, arguments: tuple[Any, ...], message: str) -> None:
     with pytest.raises(ValueError, match=message):
         used(what, *arguments)
+
+
+@pytest.mark.parametrize("finger_s", [0.01, 0.04, 0.2])
+def test_a_finger_approaches_the_balance_of_forces_with_its_time_constant(finger_s: float) -> None:
+    device = SimulatedDualSense(finger_s=finger_s)
+    device.read(0.0)
+    device.set_finger_force(0.0, SPRING_PRELOAD_N + 0.5 * SPRING_RISE_N)
+    device.read(finger_s)
+    assert device.travel == pytest.approx((0.0, 0.5 * (1.0 - math.exp(-1.0))), rel=1e-3)
