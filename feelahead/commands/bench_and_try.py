@@ -94,6 +94,7 @@ bench = Menu(
         "coverage": "robot,operator,experiments",
         "felt": "robot,operator,experiments",
         "front": "robot,operator,experiments",
+        "stability": "robot,operator,experiments,bench",
         "link": "robot,operator",
         "tick": "robot,operator",
         "turn": "robot,operator",

@@ -31,7 +31,7 @@ _STEP_M: Final = MARGIN_M / 20
 _FINEST_M: Final = 5e-6
 _HALVINGS: Final = int(np.ceil(np.log2(_STEP_M / _FINEST_M)))
 _NOTHING: Final = 1e-9
-"""Share of the sphere's volume below which a rise from an overlap is rounding."""
+"""Share of the volume of sphere or object, the smaller one, below which a rise from an overlap is rounding."""
 _LEAST: Final = 1e-14
 """Share for a rise from nothing: a splinter's tip enters long before a larger share does."""
 _FIRST_M: Final = 3.0 * MARGIN_M
@@ -210,7 +210,8 @@ class _Look:
     def _shorten(self, pairs: _Pairs, until_m: FloatArray) -> BoolArray:
         """Shorten the distances by overlaps up to `until_m` (p,); return the strengths (p, 3, 8) known by then."""
         places = np.arange(len(pairs.thing))
-        nothing_m3 = np.where(pairs.before_m3 > 0.0, _NOTHING, _LEAST) * 4.0 / 3.0 * np.pi * pairs.radii_m**3
+        smaller_m3 = np.minimum(4.0 / 3.0 * np.pi * pairs.radii_m**3, self._solids.volumes_m3[pairs.thing])
+        nothing_m3 = np.where(pairs.before_m3 > 0.0, _NOTHING, _LEAST) * smaller_m3
         nodes_m, volumes = self._nodes(pairs, until_m)
         risen = np.maximum.accumulate(np.maximum(volumes - pairs.before_m3[:, None], 0.0), axis=1)
         rises = risen[:, -1] > nothing_m3

@@ -46,10 +46,14 @@ class PosedScene:
         data.geom_xpos[self._objects] += shift_m
         self._at_rest_m = data.geom_xpos[self._gripper].copy()
 
+    def tool_pose(self) -> tuple[FloatArray, FloatArray]:
+        """Return the tool's position (3,) and rotation (3, 3), tool to world, in the present pose."""
+        site = self.scene.robot.site
+        return self._data.site_xpos[site].copy(), self._data.site_xmat[site].reshape(3, 3).copy()
+
     def approach_axis(self) -> FloatArray:
         """Return the tool's approach axis in the present pose: unit vector (3,) in the world frame."""
-        axis: FloatArray = self._data.site_xmat[self.scene.robot.site].reshape(3, 3)[:, 2].copy()
-        return axis
+        return self.tool_pose()[1][:, 2].copy()
 
     def gap_m(self, farthest_m: float = 1.0) -> float:
         """Return the least distance from the gripper to any object, at most `farthest_m`."""
