@@ -62,6 +62,7 @@ def complaint(command: str) -> str:
         ("feelahead bench overlap --peer-header /nowhere/overlap.hpp", "/nowhere/overlap.hpp", "pip download"),
         ("feelahead bench felt --picture out.png", "--picture out.png: errors have no figure", "valid: with --cover"),
         (f"feelahead bench felt --model {WALL}", "--model and --site", "all three"),
+        ("feelahead bench stability --parts x", "--parts 'x': no such part", "valid: 'overlaps'"),
         ("feelahead bench felt --cover --site tcp", "--model and --site are given without one another", "valid"),
         ("feelahead bench felt --cover --model no_such.xml --site tool", "no_such.xml: there is no such file", "MJCF"),
         (f"feelahead bench felt --cover --model {WALL} --site hand", "'hand'", "tool"),
