@@ -89,6 +89,7 @@ def _sentence(name: str) -> str:
 bench = Menu(
     "bench",
     {
+        "accuracy": "robot,operator,experiments,bench",
         "overlap": "robot,experiments,bench",
         "error": "robot,operator,experiments",
         "coverage": "robot,operator,experiments",

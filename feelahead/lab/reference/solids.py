@@ -70,14 +70,15 @@ class Solids:
         moved_m = np.zeros(len(radii))
         going = np.arange(len(radii))
         for _ in range(_STEPS):
-            gap_m = self._distance(centers[going] + moved_m[going, None] * direction, things[going]) - radii[going]
+            gap_m = self.distance_m(centers[going] + moved_m[going, None] * direction, things[going]) - radii[going]
             moved_m[going] += np.maximum(gap_m, 0.0)
             going = going[(gap_m > _NEAR_M) & (moved_m[going] <= end_m[going])]
             if not len(going):
                 break
         return np.maximum(moved_m - _ROUNDING_M, 0.0)
 
-    def _distance(self, points: FloatArray, things: IntArray) -> FloatArray:
+    def distance_m(self, points: FloatArray, things: IntArray) -> FloatArray:
+        """Return lower bounds (n,) of the distances of points from their objects; any value up to 0 inside a box."""
         nearest = np.full(len(points), np.inf)
         for kind in self._kinds:
             place, columns = kind.of(things)

@@ -1,5 +1,6 @@
 """True contacts of the gripper and a held object: onset, closing speed and free gap; only for experiments."""
 
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import mujoco  # type: ignore[import-untyped]
@@ -147,22 +148,44 @@ def contact_distance(
     The distance is at most `farthest_m`. This moves `mine` in `data`, so pass a copy; its kinematics must be up to
     date.
     """
-    start = data.geom_xpos[mine].copy()
-    moved_m, ends = 0.0, np.zeros(6)
+    start, ends = data.geom_xpos[mine].copy(), np.zeros(6)
+
+    def measure(first: int, second: int) -> tuple[float, float]:
+        gap_m = geom_distance(model, data, first, second, farthest_m, ends)
+        convex = model.geom_type[second] != GeomKind.HFIELD
+        if not (convex and 0.0 < gap_m < farthest_m):
+            return gap_m, 1.0
+        return gap_m, float((ends[3:] - ends[:3]) @ direction) / gap_m
+
+    def move(moved_m: float) -> None:
+        data.geom_xpos[mine] = start + moved_m * direction
+
+    pairs = [(first, second) for first in mine.tolist() for second in theirs.tolist()]
+    return advanced_m(pairs, measure, move, farthest_m)
+
+
+def advanced_m(
+    pairs: Sequence[tuple[int, int]],
+    measure: Callable[[int, int], tuple[float, float]],
+    move: Callable[[float], None],
+    farthest_m: float,
+) -> float:
+    """Return how far `move` can go, at most `farthest_m`, until a pair touches (conservative advancement).
+
+    measure: returns a pair's gap in m, and the share of the motion that goes across a slab of the gap's width, which
+    separates convex solids; 1 for others.
+    """
+    moved_m = 0.0
     for _ in range(_MOST_STEPS):
         step_m = farthest_m - moved_m
-        for first in mine:
-            for second in theirs:
-                gap_m = geom_distance(model, data, int(first), int(second), farthest_m, ends)
-                if gap_m <= _TOUCHING_M:
-                    return moved_m
-                # A slab of the gap's width separates convex geoms; this share of the motion goes across the slab.
-                convex = model.geom_type[second] != GeomKind.HFIELD
-                towards = float((ends[3:] - ends[:3]) @ direction) / gap_m if convex and gap_m < farthest_m else 1.0
-                if towards * step_m > gap_m:
-                    step_m = gap_m / towards
+        for first, second in pairs:
+            gap_m, towards = measure(first, second)
+            if gap_m <= _TOUCHING_M:
+                return moved_m
+            if towards * step_m > gap_m:
+                step_m = gap_m / towards
         moved_m += step_m
         if moved_m >= farthest_m:
             return farthest_m
-        data.geom_xpos[mine] = start + moved_m * direction
+        move(moved_m)
     return moved_m

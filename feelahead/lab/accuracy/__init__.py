@@ -1,0 +1,1 @@
+"""Parts of `feelahead bench accuracy`: knobs that trade run time against error, and peers on the same inputs."""
