@@ -175,11 +175,8 @@ def measure(placements: Sequence[Placement], rounds: int, peers: Mapping[tuple[s
         yield point(FULL, *key, us[key], errors_mm[key], built=one.built)
     look_us = next(us[key] for key, one in own.items() if one.built)
     for age_ms in AGES_MS:
-        aged_us, aged_mm = (
-            look_us * 1e3 * TURN_S / age_ms,
-            np.maximum(1e3 * older(placements, 1e-3 * age_ms), _KNOWN_MM),
-        )
-        yield point(BETWEEN, "age of a look", f"{age_ms} ms", aged_us, aged_mm, built=age_ms == _BUILT_AGE_MS)
+        us_a_turn, aged_mm = look_us * 1e3 * TURN_S / age_ms, _sizes_mm(older(placements, 1e-3 * age_ms))
+        yield point(BETWEEN, "age of a look", f"{age_ms} ms", us_a_turn, aged_mm, built=age_ms == _BUILT_AGE_MS)
 
 
 def measure_paths(placements: Sequence[Placement], rounds: int) -> Iterator[Row]:

@@ -7,6 +7,7 @@ from typing import Final
 import numpy as np
 
 from common.arrays import FloatArray
+from common.errors import FeelaheadError
 from feelahead.lab.approaches.frozen import SITE, frozen_scene
 from feelahead.lab.posed_gripper import PosedGripper
 from feelahead.lab.reference.pairs import BOX_SIGNS
@@ -23,7 +24,7 @@ REACH_M: Final = 0.4
 """Distance that every method examines"""
 _FREE_M: Final = (0.02, 0.15)
 _ASIDE_M: Final = 0.08
-_BESIDE_M: Final = 0.01
+_BESIDE_M: Final = 0.012
 _TRIES: Final = 200
 _FARTHEST_M: Final = 2.0
 
@@ -77,24 +78,30 @@ class Placement:
 def placements(name: str, count: int, random: np.random.Generator) -> list[Placement]:
     """Draw places of a frozen scene's objects, 20 to 150 mm ahead of the gripper and up to 80 mm aside.
 
-    Left out are places where 10 mm aside change the distance by more than 10 mm: any distance may be right there.
+    Left out are places where 12 mm aside change the distance by more than 12 mm: any distance may be right there.
+    FeelaheadError if no place is left.
     """
     scene = load_scene(frozen_scene(name), SITE)
     gripper = PosedGripper(scene)
     pose = gripper.at(gripper.home_rad)
     right, up, ahead = pose.tool_rotation.T
-    found: list[Placement] = []
+    turns = np.linspace(0.0, 2.0 * np.pi, 8, endpoint=False)
+    found, ways = list[Placement](), np.outer(np.cos(turns), right) + np.outer(np.sin(turns), up)
     for _ in range(_TRIES):
         aside_m = random.uniform(-_ASIDE_M, _ASIDE_M, 2) @ np.array([right, up])
         there = Placement(scene, pose, aside_m)
         if there.true_m >= _FARTHEST_M:
             continue
         there = Placement(scene, pose, aside_m + (random.uniform(*_FREE_M) - there.true_m) * ahead)
-        beside = (there.seen_after(_BESIDE_M * way).contact_distance_m(_FARTHEST_M) for way in (right, -right, up, -up))
+        beside = (there.seen_after(_BESIDE_M * way).contact_distance_m(_FARTHEST_M) for way in ways)
         if there.true_m > 0.5 * _FREE_M[0] and all(abs(one - there.true_m) <= _BESIDE_M for one in beside):
             found.append(there)
         if len(found) == count:
             break
+    if not found:
+        raise FeelaheadError(
+            f"scene {name}: none of {_TRIES} drawn places is usable; valid: a scene with a thing ahead"
+        )
     return found
 
 
