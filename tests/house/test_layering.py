@@ -72,7 +72,8 @@ ARROWS = """
     robot_side/viewing: common common/companion common/protocol common/realtime robot_side/drivers/mujoco
         robot_side/operators robot_side/surroundings robot_side/tick
     robot_side/settings.py: common common/command common/files robot_side/arm robot_side/drivers/mujoco
-        robot_side/enlargement robot_side/laws/named.py robot_side/operators robot_side/viewing
+        robot_side/enlargement robot_side/laws/named.py robot_side/laws/paper_settings.py robot_side/operators
+        robot_side/viewing
     robot_side/parts.py: common common/protocol common/timing robot_side/arm robot_side/compiled
         robot_side/core robot_side/laws
         robot_side/drivers/mujoco robot_side/drivers/mujoco/checks robot_side/drivers/remote robot_side/gripper
@@ -127,6 +128,7 @@ ARROWS = """
     feelahead/lab: common/* robot_side/* operator_side/* feelahead/both_sides feelahead/containers feelahead/printing
     feelahead/commands/bench_and_try.py: common common/files feelahead/lab
     feelahead/commands: common/* robot_side/compiled robot_side/drivers/mujoco robot_side/laws/named.py
+        robot_side/laws/paper_settings.py
         robot_side/viewing operator_side/* feelahead/both_sides feelahead/printing feelahead/recordings
     feelahead: common/*
     feelahead/__init__.py: common/* robot_side/* operator_side/* feelahead/both_sides

@@ -4,6 +4,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final
 
+import numpy as np
+
 from feelahead.lab.accuracy import displacement, onset, pose, volume
 from feelahead.lab.figures import figure
 from feelahead.lab.table import Row, Table
@@ -37,8 +39,11 @@ def draw_points(rows: Sequence[Row], path: Path) -> None:
             for number, ((part,), own) in enumerate(points.groups("part")):
                 _draw_part(axes, str(part), list(own), f"C{number}")
             axes.set(xscale="log", yscale="log", xlabel="processor time, us", ylabel="largest error")
+            axes.xaxis.set_minor_formatter("")
             axes.set_title(title, fontsize=9)
-            axes.margins(x=0.2, y=0.15)
+            axes.margins(y=0.15)
+            ends = np.log10([min(points.values("us")), 2.0 * max(points.values("us"))])
+            axes.set_xlim(10.0 ** np.floor(ends[0]), 10.0 ** np.ceil(ends[1]))
             axes.grid(alpha=0.3)
             axes.legend(fontsize=7, loc="upper left", bbox_to_anchor=(1.0, 1.0))
         for axes in grid.flat[len(shown) :]:
@@ -61,9 +66,11 @@ def _draw_part(axes: Any, part: str, points: Sequence[Row], colour: str) -> None
         fill, marker, size = (colour if row["ours"] else "none"), *(("*", 11) if row["built"] else ("o", 6))
         axes.plot(*place(row), marker, color=colour, markerfacecolor=fill, markersize=size)
         if row["unit"] != volume.SPHERE or (not row["ours"] and part == "volume, random"):
-            # Neighbours' names stand above and below in turns.
-            offset = (3, 4) if number % 2 == 0 else (3, -9)
-            axes.annotate(name(row), place(row), fontsize=6, xytext=offset, textcoords="offset points", color=colour)
+            # Neighbours' names stand above and below in turns, and voxels' on the left.
+            left, up = row["knob"] == "voxels", number % 2 == 0
+            offset, side = (-4 if left else 3, 4 if up else -9), "right" if left else "left"
+            style = {"fontsize": 6, "textcoords": "offset points", "color": colour, "ha": side}
+            axes.annotate(name(row), place(row), xytext=offset, **style)
 
 
 def name(row: Row) -> str:

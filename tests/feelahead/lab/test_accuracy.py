@@ -22,6 +22,7 @@ from feelahead.lab.questions.accuracy import QUESTION, AccuracySweep, Cell, cell
 from feelahead.lab.reference.approximations import voxels
 from feelahead.lab.reference.classes import frozen_class
 from feelahead.lab.reference.errors import kernel_volumes
+from feelahead.lab.reference.pairs import Pairs
 from feelahead.lab.sweep import ask
 from feelahead.lab.table import Row, Table
 
@@ -171,6 +172,10 @@ def test_finer_voxels_come_nearer_to_the_overlap() -> None:
     coarse, fine = (np.abs(voxels(pairs, edge) - exact) / pairs.sphere_volumes for edge in (0.5, 0.1))
     assert fine.max() < 0.02
     assert fine.max() < coarse.max() < 0.3
+    # Halves of a ball, below and above its middle, have equally many voxels.
+    halves = np.array([[0.0, 0.0, -5.0], [0.0, 0.0, 5.0]]), np.broadcast_to(np.eye(3), (2, 3, 3)), np.full((2, 3), 5.0)
+    below, above = voxels(Pairs("box", np.zeros((2, 3)), np.ones(2), halves), 0.25)
+    assert below == pytest.approx(above)
 
 
 def test_cells_of_volume_pose_and_delta_have_the_errors_that_their_docs_say() -> None:
