@@ -19,6 +19,7 @@ from operator_side.feel.rendering import RenderingSettings, TriggerRendering
 from operator_side.hands.travel_calibration import TravelCalibration, TriggerTravel
 from robot_side.arm.port import GripperPose
 from robot_side.drivers.mujoco.true_contact import TrueContact
+from robot_side.laws.paper_settings import PAPERS
 from robot_side.parts import as_loaded
 from robot_side.surroundings.perceived import displaced
 from robot_side.tick.situation import Situation
@@ -34,7 +35,7 @@ class Course:
     """Strength of one law at one speed."""
 
     law: str
-    """Name of the law; of the paper's with its settings"""
+    """Name of the law, or of its file; the paper's with its settings"""
     speed_m_s: float
     distance_m: FloatArray
     """(n,) way along the approach axis to the first contact"""
@@ -64,7 +65,7 @@ def strength_against_distance(
     across = np.linalg.pinv(pose.tool_jacobian)
     distances_m = np.arange(farthest_m, -0.5 * step_m, -step_m)
     courses, now_s = [], 0.0
-    named = f"{law} ({episode.settings.paper})" if law.startswith("paper") else law
+    named = f"{law} ({episode.settings.paper})" if law in PAPERS else Path(law).stem
     for speed_m_s in speeds_m_s:
         rates_rad_s = np.ascontiguousarray(across @ np.concatenate([speed_m_s * axis, np.zeros(3)]))
         rendering, travel = TriggerRendering(RenderingSettings(), TravelCalibration()), min(speed_m_s / v_max_m_s, 1.0)
@@ -102,7 +103,7 @@ def draw_courses(courses: dict[str, list[Course]], out: Path) -> None:
     for axis, (place, found) in zip(axes.flat, courses.items(), strict=False):
         for one in found:
             looks = _COLOURS[laws.index(one.law) % len(_COLOURS)], _LINES[speeds.index(one.speed_m_s) % len(_LINES)]
-            label = f"{Path(one.law).stem}, {1e3 * one.speed_m_s:.0f} mm/s"
+            label = f"{one.law}, {1e3 * one.speed_m_s:.0f} mm/s"
             axis.step(1e3 * one.distance_m, one.strength, color=looks[0], linestyle=looks[1], where="post", label=label)
         axis.set(title=place, ylim=(-0.3, 8.3))
         axis.tick_params(labelbottom=True)

@@ -6,6 +6,8 @@ from typing import Annotated, Final, Literal
 import tyro
 from msgspec import Meta
 
+PAPERS: Final = ("paper", "paper-isotropic")
+"""Names of the paper's laws"""
 EnlargementTime = Literal["always", "once"]
 Share = Annotated[float, Meta(gt=0.0, le=1.0)]
 BEST_SHARE: Final = 2e-5

@@ -5,7 +5,7 @@ from typing import Final
 
 from common.protocol.messages import Compensation
 from robot_side.laws.named import require_law
-from robot_side.laws.paper_settings import PaperSettings
+from robot_side.laws.paper_settings import PAPERS, PaperSettings
 
 TriedLaw = str
 """Name of a law, one of `LAWS`, of an installed package, or a file"""
@@ -30,7 +30,7 @@ def require_tried(laws: Sequence[TriedLaw], flag: str, built_in: Sequence[TriedL
 
 def is_paper(law: TriedLaw) -> bool:
     """Return whether the law is the paper's, in one of its forms: it has a share f."""
-    return law in ("paper", "paper-isotropic")
+    return law in PAPERS
 
 
 def with_papers(

@@ -29,12 +29,20 @@ def test_the_strength_grows_towards_the_wall_and_begins_earlier_at_speed(law: st
 
 
 def test_a_picture_has_a_panel_for_each_place(tmp_path: Path) -> None:
+    of_paper = {"law_paper_share": 0.001}
     courses = {
         name: strength_against_distance(
-            "paper", [0.1], loop_age_s=0.1, model=DATA / f"{name}.xml", site=SITE, farthest_m=0.02, step_m=0.01
+            "paper",
+            [0.1],
+            loop_age_s=0.1,
+            model=DATA / f"{name}.xml",
+            site=SITE,
+            farthest_m=0.02,
+            step_m=0.01,
+            law_paper_share=0.001,
         )
         for name in ("wall", "ball")
     }
     draw_courses(courses, tmp_path / "two.svg")
     drawn = (tmp_path / "two.svg").read_text(encoding="utf-8")
-    assert all(f"<!-- {text} -->" in drawn for text in ("wall", "ball", "paper, 100 mm/s"))
+    assert all(f"<!-- {text} -->" in drawn for text in ("wall", "ball", "paper (f = 0.001), 100 mm/s"))

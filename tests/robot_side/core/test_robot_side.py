@@ -215,4 +215,5 @@ def test_an_operator_hears_how_the_tool_is_turned_to_each_frame_of_the_sticks(be
     assert view.camera_turn_rad == pytest.approx(
         frames.camera.turn_rad(tool, mirrored=frames.camera.faces(tool)), abs=1e-2
     )
-    assert abs(view.base_turn_rad - view.camera_turn_rad) > 0.1
+    # From above, with ahead upwards, a stick means the same in both frames.
+    assert view.base_turn_rad == pytest.approx(view.camera_turn_rad, abs=1e-2)
