@@ -29,17 +29,10 @@ def test_the_strength_grows_towards_the_wall_and_begins_earlier_at_speed(law: st
 
 
 def test_a_picture_has_a_panel_for_each_place(tmp_path: Path) -> None:
-    of_paper = {"law_paper_share": 0.001}
+    place: dict[str, Any] = {"site": SITE, "law_paper_share": 0.001}
     courses = {
         name: strength_against_distance(
-            "paper",
-            [0.1],
-            loop_age_s=0.1,
-            model=DATA / f"{name}.xml",
-            site=SITE,
-            farthest_m=0.02,
-            step_m=0.01,
-            law_paper_share=0.001,
+            "paper", [0.1], loop_age_s=0.1, model=DATA / f"{name}.xml", farthest_m=0.02, step_m=0.01, **place
         )
         for name in ("wall", "ball")
     }
