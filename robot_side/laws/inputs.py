@@ -12,7 +12,6 @@ from robot_side.arm.ability import JointLimits, along_approach
 from robot_side.arm.tool_motion import ToolMotionSettings
 from robot_side.enlargement.distance import Uncertainty
 from robot_side.field.object_class import OBSTACLE, SKIPPED
-from robot_side.field.total_overlap import total_overlap_m3
 from robot_side.laws.paper_settings import PaperSettings
 from robot_side.surroundings.surroundings import Surroundings
 from robot_side.tick.sensed import Sensed
@@ -44,6 +43,9 @@ class LawInputs:
         Space counts once for each sphere that covers it. inflated_m: growth of every radius, or (m,) of each. moved_m
         (3,): displacement of the gripper in the world.
         """
+        # Imported here, as the law `swept` does without its kernel, which takes 1.5 s to compile.
+        from robot_side.field.total_overlap import total_overlap_m3  # noqa: PLC0415
+
         pose = situation.pose
         centers_m = pose.sphere_centers_m if moved_m is None else pose.sphere_centers_m + moved_m
         spheres = np.concatenate([centers_m, (pose.sphere_radii_m + inflated_m)[:, None]], axis=1)

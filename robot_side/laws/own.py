@@ -7,6 +7,7 @@ from common.files.plugged import fault_in_words, require_methods
 from common.protocol.around import Around
 from common.protocol.view_messages import EnlargementTerms
 from robot_side.arm.port import GripperPose
+from robot_side.field import total_overlap  # noqa: F401  # so that its kernel is compiled before the first turn
 from robot_side.laws.inputs import LawInputs
 from robot_side.tick.explained import Trigger
 from robot_side.tick.sensed import Sensed
