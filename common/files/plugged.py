@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from importlib.metadata import EntryPoint, entry_points
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, Final
 
 from common.errors import ConfigurationError
@@ -122,12 +123,15 @@ def made_of(kind: str, given: object, simulated: Any, methods: Mapping[str, str]
     return part
 
 
-def installed() -> list[Installed]:
-    """Return the parts that installed packages register; each is loaded to find its fault."""
+def installed(built_in: Mapping[str, Collection[str]] = MappingProxyType({})) -> list[Installed]:
+    """Return the parts that installed packages register; each is loaded to find its fault.
+
+    built_in: names of our own parts, by kind; each hides a part of the same name.
+    """
     found = []
     for kind in PLURALS:
         for point in _points(kind):
-            fault = None
+            fault = f"the built-in {kind} {point.name} hides it" if point.name in built_in.get(kind, ()) else None
             try:
                 point.load()
             except Exception as error:  # a package of somebody else's

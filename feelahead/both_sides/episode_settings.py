@@ -2,6 +2,7 @@
 
 from collections.abc import Collection, Mapping
 from dataclasses import replace
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, Final, TypeVar
 
@@ -29,8 +30,12 @@ _SETTINGS: Final = (RobotSettings.__dataclass_fields__ | OperatorSettings.__data
 def require_settings(names: Collection[str]) -> None:
     """Raise ConfigurationError if a name is no setting of an episode."""
     if unknown := set(names) - _SETTINGS:
-        valid = ", ".join(sorted(_SETTINGS | {"law", "person", "perception", "arm"}))
-        raise ConfigurationError(f"Episode: {', '.join(sorted(unknown))}: no such setting; valid: {valid}")
+        valid = sorted(_SETTINGS | {"law", "person", "perception", "arm"})
+        near = [found for name in sorted(unknown) for found in get_close_matches(name, valid, 1)]
+        meant = f" (perhaps {', '.join(near)})" if near else ""
+        raise ConfigurationError(
+            f"Episode: {', '.join(sorted(unknown))}: no such setting{meant}; valid: {', '.join(valid)}"
+        )
 
 
 def side_settings(kind: type[_Settings], base: _Settings | None, given: Mapping[str, Any]) -> _Settings:

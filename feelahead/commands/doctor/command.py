@@ -22,6 +22,7 @@ from feelahead.commands.doctor import controllers, link, machine
 from feelahead.commands.doctor.finding import Finding, Verdict, can_be
 from feelahead.commands.doctor.path import measure_path, path_line
 from feelahead.commands.doctor.port import RobotAddress
+from robot_side.laws.named import LAWS
 
 _COLOURS: Final = {Verdict.OK: "green", Verdict.NOTE: "yellow", Verdict.MISSING: "red"}
 _WIDTH_WITHOUT_TERMINAL: Final = 120
@@ -116,7 +117,7 @@ def examine() -> list[Finding]:
         *machine.check_kernels(machine.kernel_facts()),
         *([machine.check_rendering(machine.rendering_troubles())] if "mujoco" not in absent else []),
         *machine.check_realtime(machine.realtime_notes()),
-        *(_plugged(part) for part in installed()),
+        *(_plugged(part) for part in installed({"law": LAWS})),
     ]
 
 

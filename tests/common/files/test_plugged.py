@@ -61,6 +61,8 @@ def test_a_part_is_built_in_of_a_file_or_of_a_package(write: Write, package: Non
 def test_what_is_installed_is_told_with_its_fault(package: None) -> None:
     del package
     found = {one.name: one for one in installed()}
+    hidden = {one.name: one.fault for one in installed({"law": ["theirs"]})}
+    assert hidden["theirs"] == "the built-in law theirs hides it"
     assert found["theirs"].fault is None
     assert found["theirs"].package == "somebodys 1.0"
     assert (
