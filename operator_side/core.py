@@ -17,6 +17,7 @@ from common.errors import OtherVersionError, RemoteProtocolError
 from common.protocol.codec import decode, encode
 from common.protocol.link_end import Arrival, LinkEnd
 from common.protocol.messages import Hello, LeaseNotice, LinkReport, StiffnessUpdate, Telemetry
+from common.skipped import Part, shares
 from common.status.codes import LinkState
 from common.status.statuses import OperatorStatus
 from operator_side.controller.feel import Feel
@@ -66,6 +67,8 @@ class OperatorSide:
         self.commands = Commands(self.link, settings.compensation, full_rate=settings.full_rate)
         self.tuner = Tuner()
         self.rejected = 0
+        self._passes = 0
+        """Number of calls of `feel_now` with a controller, or with something to write"""
         self._listeners = tuple(listeners)
         self._blindness = Blindness()
         self._standing = LeaseState()
@@ -233,6 +236,7 @@ class OperatorSide:
             update = None
         pulled = (0.0, 0.0) if intent is None else (intent.l2, intent.r2)
         feel = self.haptics.due(update, pulled, self._blindness, now_s)
+        self._passes += intent is not None or feel is not None
         for one in self._listeners:
             one.on_output(feel, now_s)
         return feel
@@ -283,6 +287,10 @@ class OperatorSide:
                 "rejected": self.rejected,
                 "stale": self.link.stale,
             },
+            "skipped": shares(
+                motion_messages=Part(self.commands.sent, self.commands.turns),
+                writes=Part(self.haptics.writes, self._passes if self.settings.haptics else 0),
+            ),
             "lease_states": self._standing.history,
             "stops_pressed_elsewhere": self.commands.stop_button.presses,
             "tuning": self.tuner.summary(),

@@ -15,7 +15,7 @@ from common.recording.provenance import provenance
 from common.sockets.door.client import Door
 from common.sockets.door.messages import DoorSettings
 from robot_side.compiled.kernel import late_kernels
-from robot_side.compiled.warm_up import kernel_digests, warm_up
+from robot_side.compiled.warm_up import kernel_digests, kernels_compiled, warm_up
 from robot_side.core.robot_parts import RobotParts
 from robot_side.core.robot_side import RobotSide
 from robot_side.drivers.mujoco.viewpoints import first_person_eye, overview_eye
@@ -106,7 +106,8 @@ def command(arguments: Sequence[str], adapt: Callable[[RobotParts], Adapted] = a
             if settings.insecure and settings.keys is None:
                 process.note(_OPEN_TO_ALL)
             status.event("listening", control=at.control, view=at.view)
-            turns = RobotTurns(settings, core, view, cameras, door, process, drivers, physics, write_audit)
+            around = core, view, cameras, door, process, drivers, physics, write_audit
+            turns = RobotTurns(settings, *around, kernels_compiled())
             process.stack.enter_context(late_kernels(turns.note_late))
             return turns
 

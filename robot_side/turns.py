@@ -8,6 +8,7 @@ from msgspec.structs import replace
 
 from common.loop.process import Process
 from common.protocol.view_messages import VIEW_NAMES
+from common.skipped import Part, shares
 from common.sockets.door.client import Door
 from common.status.statuses import RobotStatus
 from robot_side.core.robot_side import RobotSide
@@ -51,8 +52,12 @@ class RobotTurns:
         drivers: ConnectedDrivers,
         physics: PhysicsTime,
         write_audit: Callable[[], None],
+        kernels: Part,
     ) -> None:
-        """cameras: None if no pictures are made. write_audit: adds what happened to the audit log, if there is one."""
+        """cameras: None if no pictures are made. write_audit: adds what happened to the audit log, if there is one.
+
+        kernels: those compiled by now.
+        """
         self._process, self._core, self._door, self._drivers = process, core, door, drivers
         self._write_audit = write_audit
         core.parts.arm.give_way(process.loop.clock)
@@ -63,7 +68,7 @@ class RobotTurns:
         self._reporter = LinkReporter(
             core.session, self._sending.budget, lambda: self._looking.pictures, door.tcp_figures
         )
-        self._compiled_late = 0
+        self._compiled, self._compiled_late = kernels, 0
         self.wait, self.receive, self.next_due = door.wait, door.receive, self._sending.next_due
         self.note = process.note
 
@@ -138,4 +143,7 @@ class RobotTurns:
             "strangers": self._door.counts(),
             "door": {"restarts": self._door.restarts, "dropped": self._door.dropped},
         }
-        return self._times.summary() | figures | self._core.summary()
+        core = self._core.summary()
+        kernels = self._compiled._replace(done=self._compiled.done + self._compiled_late)
+        core["skipped"] |= shares(pictures=self._looking.pictures_sent, kernels=kernels)
+        return self._times.summary() | figures | core

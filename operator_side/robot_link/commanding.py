@@ -103,7 +103,8 @@ class Commands:
 
     def __init__(self, link: LinkEnd, compensation: Compensation, *, full_rate: bool) -> None:
         """full_rate: send a command in every turn of the loop."""
-        self.sent = 0
+        self.sent = self.turns = 0
+        """Number of commands sent, and of turns in which one could have been"""
         self.stop_button = StopButton()
         self.held = HeldCommand(full_rate=full_rate)
         self._link, self._compensation = link, compensation
@@ -111,6 +112,7 @@ class Commands:
 
     def due(self, intent: OperatorIntent, token: int, now_s: float) -> tuple[ToRobot, MotionCommand] | None:
         """Return the message to send now, and the command in it; None if the command may wait."""
+        self.turns += 1
         if (leaving := self.held.due(intent, token, now_s)) is None:
             return None
         meant = dict(zip(_NAMES, _MEANT(intent), strict=True)) | {"gripper": float(intent.gripper), "token": token}

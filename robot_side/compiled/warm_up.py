@@ -9,12 +9,15 @@ from pkgutil import walk_packages
 from typing import Final
 
 from common.clock import MonotonicClock
-from robot_side.compiled.kernel import Compiled, imported_kernels
+from common.skipped import Part
+from robot_side.compiled.kernel import JIT, Compiled, imported_kernels
 from robot_side.compiled.sources import digest
 
 _NOTEWORTHY_S: Final = 1.0
 """Duration of a compilation after which it is announced"""
 _BETWEEN_NOTES_S: Final = 4.0
+PROJECTS_KERNELS: Final = 24
+"""Number of kernels in all modules of `robot_side`. A run imports those that its scene may need."""
 
 
 def warm_up(
@@ -71,6 +74,11 @@ def import_kernels() -> tuple[Compiled, ...]:
             if error.name is None or find_spec(error.name.partition(".")[0]) is not None:
                 raise
     return tuple(kernel for kernel in imported_kernels() if kernel.is_ours)
+
+
+def kernels_compiled() -> Part:
+    """Return how many of the project's kernels this process has compiled or loaded; of 0 without Numba's compiler."""
+    return Part(sum(one.ready and one.is_ours for one in imported_kernels()), PROJECTS_KERNELS if JIT else 0)
 
 
 def kernel_digests() -> dict[str, str]:

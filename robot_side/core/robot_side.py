@@ -13,6 +13,7 @@ from typing import Any, Final
 import msgspec
 import numpy as np
 
+from common.skipped import Part, shares
 from common.status.codes import LinkState
 from common.status.statuses import RobotStatus
 from robot_side.arm.joint_estimate import JointEstimate, lateness_s
@@ -243,7 +244,11 @@ class RobotSide:
             for when_s, reason in self.session.safety.stops
         ]
         return self.figures.summary() | {
-            "skipped": self.parts.law.summary(),
+            "work": self.parts.law.summary(),
+            "skipped": shares(
+                **self.parts.law.skipped(),
+                stiffness_messages=Part(self.reports.stiffness_sent, self.reports.turns_with_owner),
+            ),
             "messages": {
                 "stiffness_sent": self.reports.stiffness_sent,
                 "motion_received": self.session.motion_received,

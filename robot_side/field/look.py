@@ -116,6 +116,9 @@ def _follow(bundles: Bundles, item: int, rows: int, thing: int, along: Vector, r
     # No sample that matters lies more than a margin beyond the last distance that counts.
     entered = min(end, _last_to_count(scratch, MARGIN_M) + MARGIN_M + pair.lead)
     entries = enter(bundles, pair, rows, along, entered)
+    # Each sphere counts once: an uninflated pair follows the sphere's inflated one, and those that waited come again.
+    if waits and (item == 0 or scratch.pairs[item - 1].sphere != pair.sphere):
+        scratch.counts[Count.ENTERED] += entries
     least = min(math.pi * pair.radius * LEAST_DEPTH_M * LEAST_DEPTH_M, 0.5 * scene.object_volumes[thing])
     return follow(Profile(pair, entries, center, along, MARGIN_M, end), least, waits, bundles)
 

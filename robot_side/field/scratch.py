@@ -56,6 +56,8 @@ class Count(IntEnum):
     """Spheres whose inflation was limited to half the gap between the fingers (§3.4)"""
     CUT = 4
     """1 if the look was cut short, as it had done more than `MOST_WORK`; all strengths then begin at once"""
+    ENTERED = 5
+    """Pairs of a gripper sphere and a primitive that it enters: those whose overlaps may be computed"""
 
 
 class Error(IntEnum):

@@ -92,6 +92,11 @@ class ProbeLooks:
             self._moved_s = now_s
 
     @property
+    def traced(self) -> bool:
+        """Whether the operator side traces the map"""
+        return self._since_s < math.inf
+
+    @property
     def known(self) -> bool:
         """Whether the map is valid: all looks count, and are recent or made since the last motion."""
         old = (self._at_s <= self._moved_s) & (self._at_s < self._now_s - _HOLDS_S)
@@ -100,14 +105,14 @@ class ProbeLooks:
     @property
     def waits(self) -> bool:
         """Whether discarded looks are to be made again."""
-        return self._since_s < math.inf and bool((self._at_s < self._since_s).any())
+        return self.traced and bool((self._at_s < self._since_s).any())
 
     def due(self, motion: GripperMotion, passed_s: float) -> list[tuple[int, int]]:
         """Return side and number of the probes to look from: those that waited longest, as many as fit `passed_s`.
 
         All of them in the first tick, where `passed_s` is infinite.
         """
-        if self._since_s == math.inf:
+        if not self.traced:
             return []
         leads = np.array([[motion.ahead_m_s > -RETREATS_M_S], [motion.ahead_m_s < RETREATS_M_S]])
         waited = (self._now_s - self._at_s) / np.where(leads, PERIOD_S, _SELDOM * PERIOD_S)

@@ -7,6 +7,7 @@ import numpy as np
 
 from common.arrays import require_finite
 from common.protocol.around import Around
+from common.skipped import Part
 from robot_side.arm.port import GripperPose
 from robot_side.tick.sensed import Sensed
 from robot_side.tick.situation import Situation
@@ -32,6 +33,10 @@ class Law(Protocol):
 
     def summary(self) -> dict[str, int]:
         """Return counts of the law's work over the run, for the run's summary."""
+        ...
+
+    def skipped(self) -> dict[str, Part]:
+        """Return what the law has done, of which whole, for the run's summary: `pairs` and `looks`, if it knows."""
         ...
 
 

@@ -61,6 +61,10 @@ class Looking:
     """Result of the newest tick's further looks, once its looks had done more than `MOST_WORK`; None if they had not"""
     work: IntArray = field(default_factory=lambda: np.zeros(len(Count), dtype=np.int64))
     """Counts of the looks' work, indexed by `Count`"""
+    pairs: int = 0
+    """Gripper spheres times primitives, over all looks"""
+    at_full_rate: int = 0
+    """Number of looks if each tick made all of them; see `pass_tick`"""
     _done: int = 0
 
     def look(self, seen: Seen, *, changed: bool) -> None:
@@ -83,12 +87,21 @@ class Looking:
         if self.probes is not None:
             self.probes.begin(until_s, seen.now_s, traced=traced, moved=changed or motion.moves)
             self._look_from_probes(self.probes, self.probes.due(motion, seen.passed_s), seen)
+        self.pass_tick(seen)
+
+    def pass_tick(self, seen: Seen) -> None:
+        """Count the looks that the tick would make at the full rate: along each side, from all waypoints and probes."""
+        self.at_full_rate += 2 + (seen.situation.lateral != (0.0, 0.0))
+        self.at_full_rate += self.sides[R2].waypoints + self.sides[L2].waypoints
+        if self.probes is not None and self.probes.traced:
+            self.at_full_rate += 2 * PROBES
 
     def look_around(self, seen: Seen) -> None:
         """Look from all probes."""
         if self.probes is not None:
             until_s = stopping_s(seen.prospect(R2).able, seen.situation.loop_age_s)
             self.probes.begin(until_s, seen.now_s, traced=True, moved=True)
+            self.at_full_rate += 2 * PROBES
             self._look_from_probes(self.probes, [(side, one) for side in (R2, L2) for one in range(PROBES)], seen)
 
     def _look_from_probes(self, probes: ProbeLooks, due: list[tuple[int, int]], seen: Seen) -> None:
@@ -108,6 +121,7 @@ class Looking:
             self.cut = Field(np.zeros_like(made.onsets_m), made.sigmas_m, cut)
         self.work += made.counts
         self.looks += 1
+        self.pairs += len(pose.sphere_radii_m) * len(seen.scene.kinds)
         self.with_nothing_near += int(made.counts[Count.PAIRS] == 0)
         direction = found.asked.along.direction
         began_m = float(direction @ seen.situation.pose.tool_position_m)

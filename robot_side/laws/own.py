@@ -6,6 +6,7 @@ from common.errors import ConfigurationError, FeelaheadError
 from common.files.plugged import fault_in_words, require_methods
 from common.protocol.around import Around
 from common.protocol.view_messages import EnlargementTerms
+from common.skipped import Part
 from robot_side.arm.port import GripperPose
 from robot_side.field import total_overlap  # noqa: F401  # so that its kernel is compiled before the first turn
 from robot_side.laws.inputs import LawInputs
@@ -52,6 +53,10 @@ class OwnLaw:
     def summary(self) -> dict[str, int]:
         """Return the law's counts, if it has any."""
         return self._call("summary") or {}
+
+    def skipped(self) -> dict[str, Part]:
+        """Return nothing: what a law of somebody else skips is not known."""
+        return {}
 
     def expect(self, probability: float) -> None:
         """Pass on another P of eq. 10 to a law that takes one."""

@@ -17,6 +17,7 @@ import numpy as np
 from common.arrays import FloatArray
 from common.protocol.around import Around
 from common.protocol.view_messages import EnlargementTerms
+from common.skipped import Part
 from robot_side.arm.port import GripperPose
 from robot_side.enlargement.distance import plain_enlargements_m
 from robot_side.enlargement.kinematic_error import position_covariance
@@ -37,7 +38,7 @@ class PaperLaw:
 
     def __init__(self, inputs: LawInputs, *, isotropic: bool = False) -> None:
         """Take the arm, the errors and the surroundings of a run. isotropic: both triggers alike, as printed."""
-        self.looked = 0
+        self._ticks = self.looked = 0
         self.limited = 0
         """Number of results in which the gap between the fingers has limited D_incr"""
         self._inputs = inputs
@@ -49,6 +50,7 @@ class PaperLaw:
 
     def sense(self, situation: Situation, now_s: float) -> Sensed:
         """Return the fields of one tick. The overlap is computed again at most a hundred times a second."""
+        self._ticks += 1
         if self._sensed is None or now_s - self._sensed[0] >= PERIOD_S - 1e-9:
             self._sensed = now_s, self._look(situation)
         return self._sensed[1]
@@ -64,7 +66,11 @@ class PaperLaw:
 
     def summary(self) -> dict[str, int]:
         """Return how often the overlap was computed during the run, and how often the gap limited D_incr."""
-        return {"fields": self.looked, "limited_by_gap": self.limited}
+        return {"looks": self.looked, "limited_by_gap": self.limited}
+
+    def skipped(self) -> dict[str, Part]:
+        """Return the ticks in which the overlap was computed, of all ticks."""
+        return {"looks": Part(self.looked, self._ticks)}
 
     def explain(self, trigger: Trigger, situation: Situation, sensed: Sensed) -> EnlargementTerms:
         """Return the terms of D_incr; both triggers have the same.

@@ -24,6 +24,7 @@ from common.arrays import FloatArray
 from common.protocol.around import MOST_JOINTS, Around
 from common.protocol.messages import TriggerField
 from common.protocol.view_messages import EnlargementTerms
+from common.skipped import Part
 from common.touch_speed import touch_speed_m_s
 from robot_side.arm.ability import change_times_s
 from robot_side.arm.port import GripperPose
@@ -46,6 +47,15 @@ from robot_side.tick.explained import Trigger
 from robot_side.tick.sensed import L2, R2, STICK, Sensed
 from robot_side.tick.situation import Situation
 
+_WORK: Final = {
+    "looks_cut": Count.CUT,
+    "pairs_touching": Count.PAIRS,
+    "pairs_entered": Count.ENTERED,
+    "profiles": Count.PROFILES,
+    "overlaps": Count.OVERLAPS,
+    "spheres_limited_by_gap": Count.LIMITED,
+}
+"""Names of the looks' counts in the summary"""
 _AT_REST: Final[FloatArray] = np.empty((0, 3))
 
 
@@ -65,7 +75,7 @@ class SweptLaw:
         self._last: Seen | None = None
         """Last tick that looked"""
         self._sensed: Sensed | None = None
-        self._without_looks = 0
+        self._ticks_without_looks = 0
 
     def sense(self, situation: Situation, now_s: float) -> Sensed:
         """Return the fields and the rumble of one tick.
@@ -85,7 +95,8 @@ class SweptLaw:
             self.looking.look(seen, changed=last is None or differs(seen, last) or have_moved(seen, last))
             self._last = seen
         else:
-            self._without_looks += 1
+            self.looking.pass_tick(seen)
+            self._ticks_without_looks += 1
             if self._sensed is not None and rests(seen, last):
                 return self._sensed
         self._sensed = self._field(seen)
@@ -156,18 +167,25 @@ class SweptLaw:
         self.looking.look_around(self._see(situation, None, now_s))
 
     def summary(self) -> dict[str, int]:
-        """Return counts over the run: looks (`fields`), their work (`Count`), and what was skipped.
+        """Return counts over the run: looks, and their work (see `_WORK`).
 
-        `without_looks`: ticks in which nothing moved. `flat`: the newest scene's primitives without volume.
+        `looks_with_nothing_near`: in which no sphere touched an object within the examined distance.
+        `flat_primitives`: those of the newest scene without volume. Nothing can overlap them, so they are not felt.
         """
         looking = self.looking
-        counts = {"fields": looking.looks} | {one.name.lower(): int(looking.work[one]) for one in Count}
-        # Primitives of the newest scene without volume: nothing can overlap them, so they are not felt.
-        flat = 0 if self._last is None else self._last.scene.flat
-        return counts | {
-            "with_nothing_near": looking.with_nothing_near,
-            "without_looks": self._without_looks,
-            "flat": flat,
+        return {
+            "looks": looking.looks,
+            "looks_with_nothing_near": looking.with_nothing_near,
+            "ticks_without_looks": self._ticks_without_looks,
+            "flat_primitives": 0 if self._last is None else self._last.scene.flat,
+        } | {name: int(looking.work[count]) for name, count in _WORK.items()}
+
+    def skipped(self) -> dict[str, Part]:
+        """Return the pairs that were examined, of all spheres with all primitives in all looks; and the looks made."""
+        looking = self.looking
+        return {
+            "pairs": Part(int(looking.work[Count.ENTERED]), looking.pairs),
+            "looks": Part(looking.looks, looking.at_full_rate),
         }
 
     def explain(self, trigger: Trigger, situation: Situation, sensed: Sensed) -> EnlargementTerms:

@@ -38,6 +38,8 @@ class Reports:
     ) -> None:
         """around: `Law.around`. full_rate: send a stiffness message in every tick."""
         self.stiffness_sent = 0
+        self.turns_with_owner = 0
+        """Number of turns in which a stiffness message could have left: there was an owner of the lease"""
         self.deadband = StiffnessDeadband(full_rate=full_rate)
         """Deadband that decides when a stiffness message to the lease's owner leaves"""
         self._session, self._law_around, self._frames = session, around, frames
@@ -63,6 +65,7 @@ class Reports:
         session = self._session
         content = sensed, commanded_m_s, permission.state, stands, hindered
         outgoing = [Outgoing("haptics", *answer) for answer in session.take_answers(now_s)]
+        self.turns_with_owner += session.owner_peer is not None
         if session.owner_peer is not None and self.deadband.due(*content, permission.command, now_s):
             self.stiffness_sent += 1
             around = self._around.due(situation.pose, now_s)

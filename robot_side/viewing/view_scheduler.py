@@ -7,6 +7,7 @@ from typing import Any, Final, Protocol
 
 from common.protocol.codec import VIEW_MAXIMUM_BYTES, encode
 from common.protocol.view_messages import VIEW_NAMES, ViewName
+from common.skipped import Part
 from common.statistics import RunningStatistics
 from robot_side.operators.operator_session import OperatorSession
 from robot_side.tick.outgoing import Outgoing, OutgoingStream
@@ -71,7 +72,7 @@ class ViewScheduler:
         self._scene_hz = math.inf
         self._next_shapes_s = -math.inf
         self._begun = -1
-        self._counts = {name: {"sent": 0, "nobody_looks": 0, "behind": 0} for name in (*VIEW_NAMES, "scene")}
+        self._counts = {name: {"due": 0, "sent": 0, "nobody_looks": 0, "behind": 0} for name in (*VIEW_NAMES, "scene")}
         self._shapes_sent = 0
         self._frame_age = RunningStatistics(seed)
 
@@ -100,6 +101,7 @@ class ViewScheduler:
         due = set()
         for name, counts in self._counts.items():
             turns = self._turns(name, now_s)
+            counts["due"] += turns
             if name not in looked_at:
                 counts["nobody_looks"] += turns
             elif turns:
@@ -110,7 +112,7 @@ class ViewScheduler:
         return outgoing
 
     def summary(self) -> dict[str, Any]:
-        """Return the summary's entry `looked_at`: for each view and the scene, how many were sent, or why not."""
+        """Return the summary's entry `looked_at`: for each view and the scene, how many were due, sent, or why not."""
         cameras, counts = self._cameras, {name: dict(counts) for name, counts in self._counts.items()}
         counts["scene"]["shapes"] = self._shapes_sent
         took_s = sorted(cameras.took_s) if cameras is not None else []
@@ -118,6 +120,12 @@ class ViewScheduler:
         starts = 0 if cameras is None else cameras.starts
         age = {f"p{q}": None if (s := self._frame_age.quantile(q / 100)) is None else 1e3 * s for q in (50, 99)}
         return counts | {"companion": {"starts": starts, "picture_ms": middle, "picture_age_ms": age}}
+
+    @property
+    def pictures_sent(self) -> Part:
+        """Pictures that were sent, of those that were due at the rate of the time; of 0 without cameras"""
+        views = [] if self._cameras is None else [self._counts[name] for name in VIEW_NAMES]
+        return Part(sum(one["sent"] for one in views), sum(one["due"] for one in views))
 
     @property
     def pictures(self) -> dict[str, float | int] | None:

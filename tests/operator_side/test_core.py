@@ -64,6 +64,19 @@ def test_status_and_summary_speak_of_the_controllers_own_triggers(swapped: bool)
     assert summary["rendering"] == {"l2": none_beyond, "r2": none_beyond} | counts
 
 
+def test_of_five_turns_one_needs_a_command_and_one_a_write() -> None:
+    bench = Bench()
+    for _ in range(5):
+        bench.hands(r2=0.5)
+        bench.commands()
+        bench.feel(6)
+        bench.now_s += 0.001
+    assert bench.side.summary()["skipped"] == {
+        name: {"done": 1, "of": 5, "skipped": 0.8} for name in ("motion_messages", "writes")
+    }
+    assert Bench(haptics=False).side.summary()["skipped"] == {}
+
+
 def test_without_haptics_nothing_is_ever_written_and_the_hands_rest_all_the_same() -> None:
     bench = Bench(haptics=False)
     bench.side.controller_found(bench.now_s)

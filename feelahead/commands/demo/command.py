@@ -1,11 +1,12 @@
 """`feelahead demo`: both sides as two processes on loopback, with a simulated controller and person."""
 
 import contextlib
+import math
 import sys
 import tempfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from common.command.command_line import given_fields, parse_settings
 from common.command.status import Status
@@ -91,8 +92,31 @@ def _report(summary: dict[str, Any]) -> list[str]:
         f"stiffness: R2 up to {stiffness['r2']['max']:.2f}, L2 up to {stiffness['l2']['max']:.2f}; enlargement {grown}",
         f"target: {grasp}, lifted {task['lifted_mm']:.0f} mm, {_placed(placing)}",
         f"contacts with obstacles: {task['obstacle_contacts']}",
+        *left_out(summary.get("skipped", {})),
         *recorded,
     ]
+
+
+_NOT_NEEDED: Final = {
+    "pairs of sphere and primitive": ("pairs",),
+    "looks": ("looks",),
+    "pictures": ("pictures",),
+    "messages": ("stiffness_messages", "motion_messages"),
+    "writes": ("writes",),
+    "kernels": ("kernels",),
+}
+"""What the last line names, and the entries of the summary's `skipped` that it adds up"""
+
+
+def left_out(skipped: Mapping[str, Mapping[str, float]]) -> list[str]:
+    """Return the line that says what was not done, in whole percent, rounded down; none if nothing is known."""
+    said = []
+    for words, names in _NOT_NEEDED.items():
+        found = [skipped[name] for name in names if name in skipped]
+        if found:
+            done, whole = (sum(one[key] for one in found) for key in ("done", "of"))
+            said.append(f"{math.floor(100.0 * (1.0 - done / whole))} % of the {words}")
+    return [f"not done, because it was not needed: {', '.join(said)}"] if said else []
 
 
 def _placed(placing: Mapping[str, Any]) -> str:

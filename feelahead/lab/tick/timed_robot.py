@@ -121,7 +121,7 @@ class TimedTicks(Listener):
             self._row = self._now_s, 2 * round_, *spent
 
     def _looks(self) -> int:
-        return self._law.summary().get("fields", 0)
+        return self._law.summary().get("looks", 0)
 
 
 def command(arguments: Sequence[str]) -> int:

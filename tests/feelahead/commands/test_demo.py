@@ -16,6 +16,7 @@ import pytest
 from common.command.command_line import given_fields, parse_settings
 from common.command.status import Status
 from common.errors import ConfigurationError
+from common.skipped import Part, shares
 from feelahead.both_sides.processes import SideFailedError
 from feelahead.both_sides.summary import merge_summaries
 from feelahead.commands import open_browser
@@ -197,6 +198,17 @@ OPERATOR: dict[str, Any] = {
     "applied_age_ms": {"to_operator": {"mean": 19.0}},
     "errors": ["operator: asleep"],
 }
+
+
+def test_the_last_line_says_what_was_not_needed_and_nothing_of_what_is_not_known() -> None:
+    robot = shares(pairs=Part(21, 1000), looks=Part(3, 4), stiffness_messages=Part(10, 100), kernels=Part(0, 0))
+    operator = shares(motion_messages=Part(40, 100), writes=Part(1, 8))
+    merged = merge_summaries({"skipped": robot}, {"skipped": operator}, [])
+    assert module.left_out(merged["skipped"]) == [
+        "not done, because it was not needed: 97 % of the pairs of sphere and primitive, 25 % of the looks,"
+        " 75 % of the messages, 87 % of the writes"
+    ]
+    assert module.left_out({}) == []
 
 
 def test_what_each_side_alone_knows_stands_beside_the_others() -> None:

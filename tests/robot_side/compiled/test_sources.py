@@ -12,8 +12,9 @@ import robot_side
 import robot_side.parts  # Imported before any test, because a library of the simulation starts a process when imported.
 from common.arrays import FloatArray
 from robot_side.compiled import sources as kernel_sources
-from robot_side.compiled.kernel import Compiled, imported_kernels
+from robot_side.compiled.kernel import JIT, Compiled, imported_kernels
 from robot_side.compiled.sources import digest, sources
+from robot_side.compiled.warm_up import PROJECTS_KERNELS, kernels_compiled
 
 ROBOT_SIDE = Path(robot_side.__file__).parent
 _MARKS = {"inlined", "building_block", "compiled", "intrinsic"}
@@ -34,6 +35,11 @@ def _has_code_for_kernels(path: Path) -> bool:
     called = [node.func for node in ast.walk(tree) if isinstance(node, ast.Call)]
     used = [ast.unparse(node.func if isinstance(node, ast.Call) else node) for node in [*decorators, *called]]
     return any(name.split(".")[-1].split(")")[0] in _MARKS or "intrinsic" in name for name in used)
+
+
+def test_the_summary_counts_the_kernels_of_every_module() -> None:
+    assert len([kernel for kernel in _every_kernel() if kernel.is_ours]) == PROJECTS_KERNELS
+    assert kernels_compiled().of == PROJECTS_KERNELS * JIT
 
 
 def test_every_file_with_code_for_kernels_is_in_some_kernels_digest() -> None:

@@ -34,6 +34,19 @@ def test_an_unarmed_robot_lets_no_load_sink_however_unevenly_it_ticks() -> None:
     assert height_m[0] - height_m[1] < 1e-4
 
 
+def test_of_the_turns_with_an_owner_at_rest_one_in_twenty_milliseconds_needs_stiffness(bench: Bench) -> None:
+    assert "stiffness_messages" not in bench.robot.summary()["skipped"]
+    operator = bench.join(2)
+    before = bench.robot.summary()["skipped"]["stiffness_messages"]
+    heard = len(operator.updates)
+    bench.tick(200)
+    now = bench.robot.summary()["skipped"]["stiffness_messages"]
+    assert now["of"] - before["of"] == 200
+    assert now["done"] - before["done"] == len(operator.updates) - heard
+    assert now["skipped"] == 1.0 - now["done"] / now["of"]
+    assert len(operator.updates) - heard == 200 // 20
+
+
 def test_the_target_is_switched_once_for_each_press(bench: Bench) -> None:
     operator = bench.join(2)
     bench.drive(0.1, operator)

@@ -127,11 +127,11 @@ def test_ways_are_those_of_the_definition_and_follow_the_gripper(law: SweptLaw) 
 
 
 def looks(law: SweptLaw, ticks: int, velocity: FloatArray, now_s: float, **changes: Any) -> int:
-    before = law.summary()["fields"]
+    before = law.summary()["looks"]
     for tick in range(ticks):
         asked = situation(ball_pose(), WALL, joint_velocities_rad_s=velocity, loop_age_s=LOOP_S, **changes)
         law.sense(asked, now_s + 1e-3 * tick)
-    return law.summary()["fields"] - before
+    return law.summary()["looks"] - before
 
 
 def test_at_rest_nothing_is_looked_at_from_around_and_in_motion_every_probe_in_turn(law: SweptLaw) -> None:

@@ -187,7 +187,7 @@ def test_it_looks_a_hundred_times_a_second() -> None:
     for tick in range(100):
         sensed = law.sense(situation(ball_pose(), here if tick < 55 else there), 7.0 + 0.001 * tick)
         assert (sensed.r2.course_stiffness > 0.0) is (tick >= 60)
-    assert law.summary() == {"fields": 10, "limited_by_gap": 0}
+    assert law.summary() == {"looks": 10, "limited_by_gap": 0}
     assert PERIOD_S == 0.01
 
 

@@ -146,6 +146,6 @@ def test_towards_the_target_a_finger_is_enlarged_by_half_the_gap_at_most(gap_m: 
     target = Scene().add(Role.TARGET).box([0.0, 0.0, 0.0], [0.03, 0.02, 0.02]).objects()
     senses = Senses()
     senses.sense(fingers, target, gap_m=gap_m)
-    assert senses.law.summary()["limited"] == limited
+    assert senses.law.summary()["spheres_limited_by_gap"] == limited
     # The gap of the built-in gripper, which is open, limits no inflation here.
     assert 0.5 * OPENING_M > SIGMA_M

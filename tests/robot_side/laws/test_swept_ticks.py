@@ -28,9 +28,9 @@ class Watched:
         numbers = []
         for _ in range(count):
             self.now_s += step_s
-            before = self.law.summary()["fields"]
+            before = self.law.summary()["looks"]
             self.law.sense(replace(situation(ball_pose(), self.objects), **changes), self.now_s)
-            numbers.append(self.law.summary()["fields"] - before)
+            numbers.append(self.law.summary()["looks"] - before)
         return numbers
 
 

@@ -38,6 +38,10 @@ def test_nobody_looks_nothing_is_made() -> None:
         made = table.looking.summary()[counts]
         assert made["sent"] == 0
         assert 55 <= made["nobody_looks"] <= 61
+        assert made["due"] == made["nobody_looks"]
+    done, of = table.looking.pictures_sent
+    assert done == 0
+    assert 110 <= of <= 122
 
 
 def test_watched_views_come_thirty_times_a_second_until_a_second_after_the_last_watch() -> None:
@@ -46,6 +50,7 @@ def test_watched_views_come_thirty_times_a_second_until_a_second_after_the_last_
     table.run(3.0)
     views = Counter(frame.view for frame in table.frames())
     assert all(80 <= views[view] <= 90 for view in ("overview", "first_person"))
+    assert table.looking.pictures_sent.done == len(table.frames())
     assert 80 <= len(table.states()) <= 90
     assert len(table.shapes()) == 1
     # Ordered in the turn of its stamp, answered 4 ms later.

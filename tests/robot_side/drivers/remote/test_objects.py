@@ -223,9 +223,9 @@ def test_objects_that_all_overlap_the_gripper_cost_no_more_than_the_limit_and_th
     before = bench.robot.parts.law.summary()
     bench.drive(0.02, operator, r2=0.4)
     after = bench.robot.parts.law.summary()
-    assert after["cut"] > before["cut"]
-    looks = after["fields"] - before["fields"]
-    assert sum(after[name] - before[name] for name in ("pairs", "overlaps")) <= looks * (MOST_WORK + 2000)
+    assert after["looks_cut"] > before["looks_cut"]
+    looks = after["looks"] - before["looks"]
+    assert sum(after[name] - before[name] for name in ("pairs_touching", "overlaps")) <= looks * (MOST_WORK + 2000)
     assert bench.state == "armed"
     assert "too many things overlap" in str(bench.robot.status(bench.now_s).hindrance)
     assert operator.updates[-1].r2.course_stiffness == 1.0
