@@ -106,7 +106,7 @@ class RobotSettings(PaperFlags, SideOptions):
     reach over. The last three are drawn from the seed."""
     law: Annotated[str, tyro.conf.arg(metavar="NAME|FILE.py")] = "swept"
     """Law from which stiffness follows. swept: stiffness along the direction of each trigger, early enough to release
-    the trigger in time. paper: the paper's plain law, for comparison. paper-isotropic: its printed form, with the same
+    the trigger in time. paper: the paper's own law, for comparison. paper-isotropic: its printed form, with the same
     stiffness for both triggers. FILE.py: a law of your own (docs/python.md)."""
     assist: Assist = "none"
     """Help besides stiffness, which a strong finger can overcome. speed: the robot side limits the speed along the

@@ -4,7 +4,7 @@ python -m feelahead.lab.paper_figures --out docs/paper --only 2 3
 """
 
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
@@ -13,7 +13,8 @@ from typing import Annotated, Any, Final, Literal
 import numpy as np
 import tyro
 
-from common.command.command_line import parse_settings
+from common.command.command_line import parse_settings, run_command
+from common.errors import ConfigurationError
 from common.protocol.view_messages import VIEW_NAMES
 from common.roles import Role
 from feelahead.both_sides.against_distance import draw_courses, strength_against_distance
@@ -23,6 +24,7 @@ from feelahead.printing.progress import progress
 from robot_side.drivers.mujoco.hand.gripper_cover import placed_corners
 from robot_side.overlap import sphere_box
 
+PROGRAM: Final = "python -m feelahead.lab.paper_figures"
 _LINK: Final = "delay 100ms"
 _APPROACHES_S: Final = 1.8
 """Time after which a finger of 2 N has brought the gripper near the wall, and still moves it"""
@@ -125,12 +127,21 @@ def fig5(path: Path) -> None:
 FIGURES: Final[dict[int, Callable[[Path], Any]]] = {1: fig1, 2: fig2, 3: fig3, 4: fig4, 5: fig5}
 
 
-if __name__ == "__main__":
-    asked = parse_settings(PaperFigures, "python -m feelahead.lab.paper_figures", sys.argv[1:])
-    asked.out.mkdir(parents=True, exist_ok=True)
+def main(arguments: Sequence[str]) -> int:
+    """Draw the figures that are asked for."""
+    asked = parse_settings(PaperFigures, PROGRAM, arguments)
+    try:
+        asked.out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ConfigurationError(f"--out {asked.out}: {error.strerror}; valid: a folder that can be made") from error
     with progress("figures of the paper", float(len(asked.only))) as shown:
         for number in asked.only:
             shown.begin(f"figure {number}")
             FIGURES[number](asked.out / f"fig{number}.png")
             shown.advance(1.0)
     sys.stdout.write(f"{asked.out}\n")
+    return 0
+
+
+if __name__ == "__main__":
+    run_command(PROGRAM, main)

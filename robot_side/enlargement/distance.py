@@ -123,7 +123,7 @@ def plain_enlargements_m(
 ) -> FloatArray:
     """Return D_incr (m,) of each sphere as the paper prints it: equal in all directions, from |v| t_d and Σ's trace.
 
-    μ_c| is the vector's length: √3 times the mean along one axis if all axes have the same mean.
+    The length of μ_c is the vector's: √3 times the mean along one axis if all axes have the same mean.
     covariances (m, 3, 3) from `position_covariance`, velocities_m_s (m, 3) of the spheres' centres.
     """
     mean_m = math.hypot(*uncertainty.kinematic_mean_m) + math.hypot(*uncertainty.camera_mean_m)

@@ -21,8 +21,8 @@ from feelahead.printing.figures import shown
 from feelahead.printing.progress import progress
 
 _TAKEN: Final = {
-    *("compare", "config", "console", "console_port", "duration", "law", "link", "link_model"),
-    *("probability", "scene", "seed", "summary", "tick_period"),
+    *("compare", "config", "console", "console_port", "duration", "enlargement", "law", "law_paper_share", "link"),
+    *("link_model", "probability", "scene", "seed", "summary", "tick_period"),
 }
 """Settings that a comparison takes"""
 _LONGEST_S: Final = 45.0
@@ -88,6 +88,7 @@ def compute(settings: DemoSettings, *, pictures: bool | None = None) -> list[dic
                 tick_period=settings.tick_period,
                 probability=settings.probability,
                 law=settings.law,
+                paper=settings.paper,
             )
             runs.append({"name": name, **compared_run(trial, settings.seed, shown.advance, pictures=drawn)})
             shown.advance(limit_s - runs[-1]["took_s"])

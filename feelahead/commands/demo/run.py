@@ -87,7 +87,8 @@ def robot_arguments(
     # With a file of settings, the file decides whether tuning is permitted.
     config = "--permit-tuning" if settings.robot_config is None else f"--config={settings.robot_config}"
     watched = ["--cameras.at-once"] if settings.has_pages else []
-    own = _flags(settings, given, *_SHARED, "scene", "model", "site", "site_axis", "probability", "assist", "law")
+    of_law = "probability", "assist", "law", "law_paper_share", "enlargement"
+    own = _flags(settings, given, *_SHARED, "scene", "model", "site", "site_axis", *of_law)
     ports = f"--bind={listening['control']}", f"--view-bind={listening['view']}"
     return [*_files(settings, summary), *ports, config, *watched, *own]
 

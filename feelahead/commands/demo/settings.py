@@ -11,10 +11,11 @@ from common.command.run_options import RunOptions
 from common.limits import check_limits
 from common.protocol.messages import Compensation
 from robot_side.laws.named import require_law
+from robot_side.laws.paper_settings import PaperFlags
 
 
 @dataclass(frozen=True)
-class DemoSettings(RunOptions):
+class DemoSettings(PaperFlags, RunOptions):
     """Both sides on this machine: a simulated arm, a simulated DualSense, and a scripted person.
 
     The person arms the arm and pulls R2 to advance towards the target. They feel the trigger stiffen near objects.
@@ -42,7 +43,8 @@ class DemoSettings(RunOptions):
     """speed: the robot side caps the speed along the triggers, so that the arm stops where full strength begins."""
     law: Annotated[str, tyro.conf.arg(metavar="NAME|FILE.py")] = "swept"
     """Law of the stiffness. swept: stiffness along the direction of each trigger, early enough to release the trigger
-    in time. paper: the paper's plain law, for comparison. FILE.py: a law of your own (docs/python.md)."""
+    in time. paper: the paper's own law, for comparison. paper-isotropic: its printed form, with the same stiffness for
+    both. FILE.py: a law of your own (docs/python.md)."""
     compensation: Compensation = "operator"
     """Side that compensates the delay. operator: by the commands still under way. robot: by speed times loop age
     (v t_d, eq. 8)."""

@@ -61,7 +61,7 @@ class FrontSettings(Sweep):
     haptics and judged, as by `bench coverage` at P = 0.9. f is chosen on some scenes, for the most of: share of
     contacts prevented, minus share of the pulled time with a false alarm. Equal ones: the larger f. Then it is tried on
     the scenes kept apart.
-    --quick: three f, few scenes and links.
+    --quick: three f unless given, few scenes and links.
     """
 
     shares: Annotated[tuple[Share, ...], tyro.conf.arg(metavar="F...")] = _SHARES
@@ -83,7 +83,7 @@ class FrontSettings(Sweep):
     @property
     def papers(self) -> tuple[PaperSettings, ...]:
         """Settings of the paper's law that are tried."""
-        shares = self.shares[1::2] if self.quick else self.shares
+        shares = self.shares[1::2] if self.quick and self.shares == _SHARES else self.shares
         return tuple(PaperSettings(share, when) for when, share in product(self.enlargements, shares))
 
 
@@ -165,7 +165,8 @@ def points(table: Table, group: Group) -> Table:
     free = {_place(row): row for row in mine.where(law="none")}
     found = []
     for (law, enlargement, share), rows in mine.groups(*_VARIANT, "share"):
-        pulls = [row for row in rows if "passes" in row]
+        # An unfinished sweep may lack the pull without haptics. A disarmed arm has prevented nothing.
+        pulls = [row for row in rows if "passes" in row and _place(row) in free and row["disarmed"] is None]
         ahead = [row for row in pulls if not row["passes"] and free[_place(row)]["contact_speed_mm_s"] is not None]
         touched = [row["contact_speed_mm_s"] for row in ahead if row["contact_speed_mm_s"] is not None]
         lost = [_gone_s(row) - _gone_s(free[_place(row)]) for row in pulls if row["passes"]]

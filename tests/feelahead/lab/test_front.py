@@ -10,7 +10,7 @@ from robot_side.laws.paper_settings import BEST_SHARE, PaperSettings
 def pull(law: str, share: float | None, link: str, speed_mm_s: float | None, **changes: object) -> Row:
     when = None if share is None else "always"
     row = {"group": "apart", "law": law, "share": share, "enlargement": when, "scene": "wall", "link": link, "seed": 0}
-    return row | {"passes": False, "contact_speed_mm_s": speed_mm_s, "gone_s": 2.0} | changes
+    return row | {"passes": False, "contact_speed_mm_s": speed_mm_s, "gone_s": 2.0, "disarmed": None} | changes
 
 
 def judged(law: str, share: float | None, alarms: int) -> Row:
@@ -25,6 +25,8 @@ def test_a_point_has_what_a_law_prevents_and_what_it_costs() -> None:
         *(pull("paper", 0.01, link, speed) for link, speed in (("0 ms", None), ("200 ms", 80.0), ("400 ms", None))),
         pull("none", None, "200 ms", None, passes=True),
         pull("paper", 0.01, "200 ms", None, passes=True, gone_s=None),
+        pull("paper", 0.01, "50 ms", None),  # nothing to compare it with, in an unfinished sweep
+        pull("paper", 0.01, "0 ms", 90.0, disarmed="a button"),
         judged("paper", 0.01, 3),
         judged("paper", 0.01, 1),
     ]
@@ -59,6 +61,7 @@ def test_each_law_pulls_in_each_scene_and_the_default_f_is_among_those_tried() -
     assert of_paper == set(settings.papers)
     assert PaperSettings(BEST_SHARE) in of_paper
     assert len(of_paper) == 2 * 7
+    assert FrontSettings(quick=True, shares=(0.3,)).papers[0] == PaperSettings(0.3)
 
 
 @pytest.mark.long
