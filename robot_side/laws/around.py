@@ -129,6 +129,11 @@ class ProbeLooks:
         self._at_s[side, number], self._direction[side, number] = self._now_s, direction
         self._began_m[side, number], self._onsets_m[side, :, number] = began_m, onsets_m[:, -1]
 
+    def pass_over(self, due: list[tuple[int, int]]) -> None:
+        """Note that looks from these probes, by side and number, would find nothing."""
+        for side, number in due:
+            self._at_s[side, number], self._onsets_m[side, :, number] = self._now_s, np.inf
+
     def onsets_m(self, pose: GripperPose, sensed: Sensed, velocities_m_s: FloatArray) -> FloatArray:
         """Return the map's onset distances (LISTS, PROBES) from the tool's present pose.
 

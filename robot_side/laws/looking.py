@@ -15,6 +15,7 @@ from robot_side.laws.gripper_motion import GripperMotion
 from robot_side.laws.path import Drift, Waypoint, times_ahead_s, waypoints
 from robot_side.laws.prospect import Assumed, Prospect, prospect, stopping_s
 from robot_side.laws.recent_looks import Newest, RecentLooks
+from robot_side.laws.vicinity import farthest_m, nothing_within
 from robot_side.surroundings.scene_table import SceneTable
 from robot_side.tick.sensed import L2, R2, STICK
 from robot_side.tick.situation import Situation
@@ -66,11 +67,13 @@ class Looking:
     at_full_rate: int = 0
     """Number of looks if each tick made all of them; see `pass_tick`"""
     _done: int = 0
+    _clear: bool | None = None
+    """Whether nothing is near in the newest tick that looked (see `vicinity`); None if no look depended on it"""
 
     def look(self, seen: Seen, *, changed: bool) -> None:
         """Make the looks of one tick. changed: whether the situation has changed, or objects have moved."""
         situation, motion = seen.situation, seen.motion
-        self.cut, self._done = None, 0
+        self.cut, self._clear, self._done = None, None, 0
         deflected, traced = situation.lateral != (0.0, 0.0), situation.compensation == "operator"
         for side in (R2, L2):
             leads = motion.ahead_m_s > -RETREATS_M_S if side == R2 else motion.ahead_m_s < RETREATS_M_S
@@ -86,8 +89,19 @@ class Looking:
         self._look_from_waypoints(seen, until_s, traced=on_map)
         if self.probes is not None:
             self.probes.begin(until_s, seen.now_s, traced=traced, moved=changed or motion.moves)
-            self._look_from_probes(self.probes, self.probes.due(motion, seen.passed_s), seen)
+            due = self.probes.due(motion, seen.passed_s)
+            if due and self._nothing_near(seen):
+                self.probes.pass_over(due)
+            else:
+                self._look_from_probes(self.probes, due, seen)
         self.pass_tick(seen)
+
+    def _nothing_near(self, seen: Seen) -> bool:
+        if self._clear is None:
+            reach_m = farthest_m(seen.situation, seen.motion, seen.assumed, self.ahead.encoder_sigma_rad)
+            tool_m = seen.situation.pose.tool_position_m
+            self._clear = self.cut is None and nothing_within(seen.scene, seen.classes.usual, tool_m, reach_m)
+        return self._clear
 
     def pass_tick(self, seen: Seen) -> None:
         """Count the looks that the tick would make at the full rate: along each side, from all waypoints and probes."""
@@ -147,6 +161,10 @@ class Looking:
             if times_s or looks.waypoints:
                 ahead = waypoints(drift, times_s, looks.nearest(len(times_s)))
                 looks.keep_up_to(len(ahead))
-                for number in looks.due(seen.passed_s, seen.now_s):
+                due = looks.due(seen.passed_s, seen.now_s)
+                if due and not looks.found and self._nothing_near(seen):
+                    looks.pass_over(due, seen.now_s)
+                    continue
+                for number in due:
                     found = seen.prospect(side, ahead[number - 1])
                     looks.add(number, seen.now_s, *self._one(found, seen)[1:])

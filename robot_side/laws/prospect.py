@@ -20,7 +20,7 @@ from robot_side.tick.situation import Situation
 
 BEYOND_M: Final = 0.05
 """Distance examined beyond the stopping distance (loop age, reaction and braking), because the loop age varies"""
-_BETWEEN_S: Final = 0.02
+BETWEEN_S: Final = 0.02
 """Time for which the gripper may go on at full speed after a look, and its surroundings are still known"""
 
 
@@ -94,7 +94,7 @@ def prospect(
         stretch = 1.0 / math.sqrt(float(chord @ chord))
         direction = (forth * stretch) * chord
     able = ability(pose, assumed.limits, direction, full_speed_m_s)
-    farthest_m = horizon_m(able, age_s) + _BETWEEN_S * full_speed_m_s
+    farthest_m = horizon_m(able, age_s) + BETWEEN_S * full_speed_m_s
     along = _along(direction, able, situation, assumed.uncertainty, max(farthest_m - gone_m, 0.0) / stretch, side)
     widest_m = math.inf if situation.gap_m is None else 0.5 * max(situation.gap_m, 0.0)
     return Prospect(Asked(pose, classes, along, widest_m), able, gone_m, stretch)

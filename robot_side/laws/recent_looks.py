@@ -92,12 +92,25 @@ class RecentLooks:
 
         Earlier looks from the same waypoint are forgotten if they are older than STEADY_S or along another direction.
         """
+        # Each list ascends. Where nothing was found before, nothing more is to be remembered.
+        if onsets_m[0, 0] == onsets_m[1, 0] == np.inf and not self.found:
+            self.pass_over([waypoint], now_s)
+            return
         old = (self._at_s <= now_s - STEADY_S) | (self._direction @ direction <= _SAME_DIRECTION)
         self._forget(old & (self._waypoint == waypoint))
         row = int(self._at_s.argmin())
         self._at_s[row], self._waypoint[row], self._direction[row] = now_s, waypoint, direction
         self._reached_m[row] = onsets_m.ravel() + began_m
         self._looked_s[waypoint], self._nearest_m[waypoint] = now_s, onsets_m[0, -1]
+
+    @property
+    def found(self) -> bool:
+        """Whether any look that counts has found something"""
+        return bool((self._reached_m < np.inf).any())
+
+    def pass_over(self, waypoints: list[int], now_s: float) -> None:
+        """Note that looks from these waypoints find nothing; only while none has `found` anything."""
+        self._looked_s[waypoints], self._nearest_m[waypoints] = now_s, np.inf
 
     def shortest_m(self, tool_m: FloatArray) -> FloatArray:
         """Return the shortest onset distances (2, 8) from the tool's present position (3,); infinite without looks."""
