@@ -69,7 +69,7 @@ def test_the_demo_runs_both_sides_and_writes_one_summary(tmp_path: Path) -> None
         # The emulated delay is a floor; a busy machine's excess is for the benchmark.
         assert summary["delay_ms"][direction]["p50"] >= 20.0
     for key in (
-        *("duration_s", "ticks", "tick_us", "tick_cpu_us", "skipped", "messages", "delay_ms", "applied_age_ms"),
+        *("duration_s", "ticks", "tick_us", "tick_cpu_us", "skipped", "work", "messages", "delay_ms", "applied_age_ms"),
         *("enlargement_mm", "overlap_mm3", "stiffness", "zones", "min_distance_mm", "contacts", "stops", "errors"),
     ):
         assert key in summary
