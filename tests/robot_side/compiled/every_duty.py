@@ -26,7 +26,8 @@ from tests.robot_side.session_bench import QUICK, Bench, Operator
 @contextmanager
 def prepared(law: str, model: Path | None = None, *, any_objects: bool = False) -> Iterator[SceneParts]:
     """Yield a robot side's parts as a process makes them, with their kernels ready; any other kernel is an error."""
-    settings = replace(QUICK, law=law, assist="speed", permit_tuning=True)
+    # With a smaller f the paper's laws, which know no support, let nothing be set down.
+    settings = replace(QUICK, law=law, law_paper_share=0.05, assist="speed", permit_tuning=True)
     # As the built-in scene: the checks of a person's own model run kernels, too.
     scene = None if model is None else load_scene(model, "tool")
     parts = replace(build_parts(settings, 1, "clock", scene), any_objects=any_objects)
@@ -44,6 +45,8 @@ def explain(bench: Bench, parts: SceneParts) -> None:
     sensed, situation = bench.robot.newest
     parts.explains.explain("l2", situation, sensed)
     parts.explains.explain("r2", situation, sensed)
+    parts.enlarged.overlaps_m3("l2", situation)
+    parts.enlarged.overlaps_m3("r2", situation)
     bench.robot.status(bench.now_s)
 
 
