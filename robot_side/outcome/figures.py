@@ -115,7 +115,8 @@ class RunFigures(Listener):
             armed = found.motion_state == "armed"
             if found.situation.loop_age_known:
                 self._loop_age.add(found.situation.loop_age_s)
-                self._situation = found.situation
+                # Where there was too much to look at, its volume would take too long, too.
+                self._situation = None if found.sensed.cut else found.situation
             self.tick(found.sensed, armed=armed, settled=found.situation.loop_age_settled)
             self.task(armed, found.holds_target, found.target_m, tick.now_s)
         self._unread.clear()

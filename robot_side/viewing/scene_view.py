@@ -139,7 +139,9 @@ class SceneView:
                 begun.terms[trigger] = self._law.explain(trigger, begun.situation, begun.sensed)
                 return None
             if trigger not in begun.overlaps_m3:
-                begun.overlaps_m3[trigger] = self._enlarged.overlaps_m3(trigger, begun.situation)
+                # Where there was too much to look at, its volumes would take too long, too.
+                known = not begun.sensed.cut
+                begun.overlaps_m3[trigger] = self._enlarged.overlaps_m3(trigger, begun.situation) if known else {}
                 return None
         self._begun, self._overlaps_m3 = None, begun.overlaps_m3
         return self._state(header(), begun, ticks)
