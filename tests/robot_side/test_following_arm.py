@@ -126,7 +126,7 @@ def test_what_it_does_not_follow_counts_in_d_sigma() -> None:
             assert bench.state == "armed"
             assert bench.robot.newest is not None
             sensed, situation = bench.robot.newest
-            sigma_m = bench.robot.parts.law.explain("r2", situation, sensed).terms.sigma_m  # type: ignore[attr-defined]
+            sigma_m = bench.robot.parts.law.explain("r2", situation, sensed).sigma_m  # type: ignore[attr-defined]
             found.append((sigma_m, bench.robot.status(bench.now_s).hindrance))
     (followed_m, _), (stood_m, _), (slow_m, says), (stands_m, says_nothing) = found
     assert "too slowly" in str(says)

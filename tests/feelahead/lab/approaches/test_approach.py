@@ -18,6 +18,7 @@ from feelahead.lab.questions import approach as module
 from feelahead.lab.questions import haptics
 from feelahead.lab.questions.approach import QUESTION, figures
 from feelahead.lab.sweep import ask
+from robot_side.laws.paper_settings import PaperSettings
 from tests.helpers.refusal import refusal
 from tests.helpers.repository import DATA
 
@@ -181,7 +182,7 @@ def test_with_one_delay_the_axis_has_the_laws_and_no_delay_that_none_had(runs: M
     laws = ("--law", "swept", "paper", "--link", "delay 200ms")
     assert tried("--model", WALL, "--force", "3", *laws, "--picture", str(picture)) == 0
     texts = set(re.findall(r"<!-- (.*?) -->", picture.read_text()))
-    assert {"swept", "paper", "law, at 200 ms each way"} < texts
+    assert {"swept", f"paper ({PaperSettings()})", "law, at 200 ms each way"} < texts
     assert runs.asked
 
 
