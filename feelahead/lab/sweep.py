@@ -9,7 +9,8 @@ interruption.
 import functools
 import hashlib
 import sys
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Generic, TypeVar
@@ -155,7 +156,7 @@ def ask(question: Question[Any, Any], arguments: Sequence[str]) -> int:
         )
     done = sweep(question, settings)
     try:
-        _write(question, settings, done.table)  # before printing, which fails if the reader ends early, as `head` does
+        _write(question, settings, done)  # before printing, which fails if the reader ends early, as `head` does
     finally:
         _show(question, settings, done)
     if done.ended is not None:
@@ -173,9 +174,10 @@ def _show(question: Question[S, C], settings: S, done: "Swept") -> None:
     """Print the tables and goals of the finished rows, and the failures."""
     console = Console(width=None if sys.stdout.isatty() else _WIDTH, highlight=False, markup=False)
     if len(done.table):
-        for shown in question.show(settings, done.table):
-            console.print(shown)
-        show_goals(console, question.goals(settings, done.table))
+        with _missing_rows(done, "tables"):
+            for shown in question.show(settings, done.table):
+                console.print(shown)
+            show_goals(console, question.goals(settings, done.table))
     for line in done.failures:
         console.print(f"failed: {line}", soft_wrap=True)
     if frozen := question.frozen(settings):
@@ -194,6 +196,20 @@ class Swept:
     ended: str | None = None
     """Reason for an early end; None if all pieces were run"""
     interrupted: bool = False
+
+
+@contextmanager
+def _missing_rows(done: Swept, what: str) -> Iterator[None]:
+    """Where pieces are not finished, say that `what` lacks their rows, instead of ending with an error about them."""
+    try:
+        yield
+    except FeelaheadError:
+        raise
+    except (ArithmeticError, LookupError, TypeError, ValueError) as error:
+        if not done.left and not done.failures:
+            raise
+        said = f"{type(error).__name__}: {error}".splitlines()[0]
+        sys.stderr.write(f"the {what} cannot be made without the rows that are missing ({said:.100})\n")
 
 
 def sweep(question: Question[S, C], settings: S) -> Swept:
@@ -261,9 +277,9 @@ def code_hash(question: Question[Any, Any]) -> str:
     return _code_hash(Path(question.run.__code__.co_filename))
 
 
-def _write(question: Question[S, C], settings: S, table: Table) -> None:
+def _write(question: Question[S, C], settings: S, done: Swept) -> None:
     """Write the files that the flags name: summary, tables, picture and the question's own."""
-    frozen = question.frozen(settings)
+    frozen, table = question.frozen(settings), done.table
     if settings.summary is not None:
         runs = list(table)
         figures = runs[0] if len(runs) == 1 else {"runs": runs}
@@ -277,6 +293,7 @@ def _write(question: Question[S, C], settings: S, table: Table) -> None:
             write(path)
             if path.is_file():
                 write_json(flag, path.with_name(path.name + ".json"), made_by)
-    if settings.picture is not None and question.draw is not None and len(table):
-        question.draw(settings, table, settings.picture)
-    question.also(settings, table)
+    with _missing_rows(done, "figure"):
+        if settings.picture is not None and question.draw is not None and len(table):
+            question.draw(settings, table, settings.picture)
+        question.also(settings, table)

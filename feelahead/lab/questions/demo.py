@@ -30,6 +30,7 @@ from robot_side.drivers.mujoco.gripper_measurement import measure_gripper
 from robot_side.drivers.mujoco.robot_model import SiteAxis
 from robot_side.drivers.mujoco.scene import load_scene
 from robot_side.laws.named import require_law
+from robot_side.laws.paper_settings import PaperFlags
 
 COLUMNS: Final = {
     "seed": ("seed", 0),
@@ -47,7 +48,7 @@ COLUMNS: Final = {
 
 
 @dataclass(frozen=True)
-class DemoSettings(Sweep):
+class DemoSettings(PaperFlags, Sweep):
     """Run the demo with each seed in virtual time, and judge each run by the simulation's true positions."""
 
     seeds: Annotated[int, Meta(ge=1), tyro.conf.arg(metavar="N")] = 10
@@ -61,7 +62,7 @@ class DemoSettings(Sweep):
     site_axis: SiteAxis = "z"
     """Axis of the site along which R2 advances."""
     law: Annotated[str, tyro.conf.arg(metavar="NAME|FILE.py")] = "swept"
-    """Law of the stiffness: swept, paper, or a file of your own (docs/python.md)."""
+    """Law of the stiffness: swept, paper, paper-isotropic, or a file of your own (docs/python.md)."""
     link: Annotated[tuple[str, ...], tyro.conf.arg(metavar="SPEC...")] = ("", "delay 200ms 10ms distribution normal")
     """Emulated links, in both directions, in netem's syntax."""
     link_model: LinkModel = "datagram"
@@ -87,7 +88,7 @@ def cells(settings: DemoSettings) -> Iterator[Trial]:
     for link in settings.link[: 1 if settings.quick else None]:
         one = Trial(settings.scene, link, "reacting", settings.person, settings.duration, settings.link_model)
         own = replace(one, model=settings.model, site=settings.site, site_axis=settings.site_axis)
-        yield replace(own, tick_period=settings.tick_period, law=settings.law)
+        yield replace(own, tick_period=settings.tick_period, law=settings.law, paper=settings.paper)
 
 
 def run(cell: Trial, seed: int) -> Iterator[Row]:

@@ -11,6 +11,7 @@ import sys
 import weakref
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -248,6 +249,27 @@ def test_ctrl_c_ends_with_130_and_says_how_to_go_on(tmp_path: Path, expected: by
     assert rows.exists()
     held(tmp_path, 4).unlink()
     assert _without_folder(_asked(tmp_path, *grid[len(_GRID) : -2])) == _without_folder(expected)
+
+
+@pytest.mark.parametrize("order", ["fail", "done"])
+def test_a_table_that_needs_all_rows_hides_neither_how_a_sweep_ended_nor_a_fault_of_its_own(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], order: str
+) -> None:
+    def needs_all(*_: object) -> list[str]:
+        return [{"first": "row"}["second"]]
+
+    question = replace(QUESTION, show=needs_all, draw=needs_all)
+    grid = ["--numbers", "1", "2", "--folder", str(tmp_path), "--workers", "1", "--picture", str(tmp_path / "p.png")]
+    (tmp_path / "2-0").write_text(order)
+    if order == "done":
+        with pytest.raises(KeyError):
+            ask(question, grid)
+        return
+    assert ask(question, grid) == 1
+    said = capsys.readouterr()
+    for what in ("tables", "figure"):
+        assert f"the {what} cannot be made without the rows that are missing (KeyError: 'second')" in said.err
+    assert "failed: number 2" in said.out
 
 
 def test_no_moment_loses_a_stop_signal(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
