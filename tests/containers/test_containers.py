@@ -102,7 +102,7 @@ def test_sigterm_ends_both_sides_well(running: Engine) -> None:
 
 
 def test_a_trial_of_the_latency_experiment(compose: Compose, tmp_path: Path) -> None:
-    """A trial touches the object both in virtual time and in containers, and leaves no container behind."""
+    """A trial touches the object in virtual time and in containers, or was stopped there, and leaves none behind."""
     words = [
         "--links",
         "lan",
@@ -121,16 +121,17 @@ def test_a_trial_of_the_latency_experiment(compose: Compose, tmp_path: Path) -> 
     summary = tmp_path / "latency.json"
     command = [sys.executable, "-P", "-m", "feelahead", "try", "latency", *words, f"--summary={summary}"]
     environment = {**compose.engine.environment, **compose.settings}
-    touched: dict[str, bool] = {}
-    for _ in range(3):  # In real time: a busy machine may spoil a trial, which then says why.
-        done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=300, check=False)
-        if done.returncode == 0:
-            trials = json.loads(summary.read_text())["runs"]
-            touched = {trial["medium"]: trial["contact_speed_mm_s"] is not None for trial in trials}
-        if all(touched.values()) and touched:
-            break
-        print(done.stdout[-2000:], done.stderr)
-    assert touched == {"virtual": True, "containers": True}
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=300, check=False)
+    assert done.returncode == 0, done.stdout[-2000:] + done.stderr
+    trials = {trial["medium"]: trial for trial in json.loads(summary.read_text())["runs"]}
+    assert set(trials) == {"virtual", "containers"}
+    for trial in trials.values():
+        assert min(trial["to_robot_samples"], trial["to_operator_samples"]) > 0
+    assert trials["virtual"]["contact_speed_mm_s"] is not None
+    # In real time: a busy machine may hold up a command, and the arm then stops.
+    in_containers = trials["containers"]
+    print({name: in_containers[name] for name in ("contact_speed_mm_s", "min_distance_mm", "stops")})
+    assert in_containers["contact_speed_mm_s"] is not None or in_containers["stops"] > 0
     assert compose.existing(f"name={TRIALS}") <= before
 
 
