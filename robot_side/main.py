@@ -20,7 +20,7 @@ from robot_side.core.robot_parts import RobotParts
 from robot_side.core.robot_side import RobotSide
 from robot_side.drivers.mujoco.viewpoints import first_person_eye, overview_eye
 from robot_side.drivers.remote.connected_drivers import ConnectedDrivers, driver_ports
-from robot_side.parts import build_parts
+from robot_side.parts import build_parts, take_limits
 from robot_side.recording.recorder import RobotEncoder, RobotRecorder
 from robot_side.settings import RobotSettings
 from robot_side.tick.events import Listener
@@ -93,6 +93,9 @@ def command(arguments: Sequence[str], adapt: Callable[[RobotParts], Adapted] = a
             cameras.update(now_s, now_s, (), expected=True)
         warm_up(lambda ready, of: process.note(_COMPILING.format(ready, of)), parts.kernels)
         drivers.wait(write_audit)
+        settings, note = take_limits(settings, parts, drivers)
+        if note:
+            process.note(note)
         if recording is not None:
             also = {"kernels": kernel_digests(), "notes": parts.notes}
             recording.begin(provenance(settings, epoch, clock_domain()) | also)

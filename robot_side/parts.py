@@ -2,17 +2,18 @@
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from common.arrays import BoolArray, FloatArray
+from common.arrays import BoolArray
 from common.errors import ConfigurationError
 from common.protocol.link_end import LinkEnd
 from common.roles import Role
 from common.timing.ages import LoopAge
 from robot_side.arm.following import Following
+from robot_side.arm.limits import ACCELERATION_RAD_S2, VELOCITY_RAD_S, ArmLimits, JointLimits
 from robot_side.compiled.kernel import Compiled, imported_kernels
 from robot_side.core.robot_parts import RobotParts
 from robot_side.drivers.mujoco.arm import MujocoArm, stand
@@ -26,7 +27,6 @@ from robot_side.drivers.mujoco.checks.start_collision import start_collision
 from robot_side.drivers.mujoco.encoders import Encoder
 from robot_side.drivers.mujoco.gripper_measurement import GripperTravel
 from robot_side.drivers.mujoco.hand.gripper_cover import GripperCover
-from robot_side.drivers.mujoco.joint_reference import MotionLimits
 from robot_side.drivers.mujoco.kinematics import MujocoKinematics
 from robot_side.drivers.mujoco.model_enums import JointKind
 from robot_side.drivers.mujoco.robot_model import joint_names
@@ -106,8 +106,7 @@ def build_parts(
     )
     noise, camera_noise = np.random.SeedSequence(settings.seed).generate_state(2)
     encoder = Encoder(settings.encoder.sigma_rad, settings.encoder.resolution_rad, int(noise))
-    limits = MotionLimits()
-    arm, ends_rad, travel = _arm(scene, encoder, limits, drivers)
+    arm, limits, travel = _arm(scene, encoder, settings, drivers)
     notes = _notes(scene, settings, travel)
     if settings.model is not None and isinstance(arm, MujocoArm):
         notes += tuple(following_findings(scene, arm, limits))
@@ -121,12 +120,11 @@ def build_parts(
     # Before the first tick, as a search for spheres takes far longer than one.
     first = as_loaded(scene, scene.roles) if settings.objects is None else perceived([], [], 0.0)
     held_covers = HeldCovers(first, settings.cover_m, scene.never_held, searching)
-    joint_limits = limits.of_joints(arm.joint_count, *ends_rad, _slides(scene))
     surroundings = Surroundings()
     prediction, prediction_note = settings.prediction_for(scene.robot.fingerprint)
     errors = settings.uncertainty(prediction)
     encoder_sigma_rad = np.full(arm.joint_count, encoder.standard_deviation_rad())
-    inputs = LawInputs(errors, encoder_sigma_rad, joint_limits, settings.motion, surroundings, settings.paper)
+    inputs = LawInputs(errors, encoder_sigma_rad, limits, settings.motion, surroundings, settings.paper)
     law = make_law(settings.law if law is None else law, inputs)
     enlarged = EnlargedGripper(inputs)
 
@@ -154,8 +152,8 @@ def build_parts(
             _episodes(settings, arm, camera),
         ),
         loop_age=LoopAge(settings.assumed_delay_s),
-        limits=joint_limits,
-        following=Following(joint_limits, joint_names(scene)[0], encoder.standard_deviation_rad()),
+        limits=limits,
+        following=Following(limits, joint_names(scene)[0], encoder.standard_deviation_rad()),
         misplaced_m=float(np.linalg.norm(errors.mean_m)) + max(errors.quantile, 0.0) * errors.camera_sd_m,
         home_rad=scene.data.qpos[scene.robot.arm_positions].copy(),
         frames=stick_frames(scene),
@@ -169,6 +167,30 @@ def build_parts(
         seed=settings.seed,
         notes=(*notes, *late),
     )
+
+
+def take_limits(settings: RobotSettings, parts: SceneParts, drivers: ConnectedDrivers) -> tuple[RobotSettings, str]:
+    """Take the limits that the arm's driver says, where the settings give none.
+
+    Return the settings with them, as a recording keeps them, and a note for a person; no note without --arm.
+    """
+    if not drivers.has_arm:
+        return settings, ""
+    said, given = drivers.said_limits() or ArmLimits(), settings.arm_limits
+    limits = given.unless_known(said)
+    parts.limits.take(limits.of_joints(parts.arm.joint_count))
+    drivers.limits_taken()
+    whose = {
+        source: ", ".join(name for name, value in vars(of).items() if value is not None)
+        for source, of in (("the settings", given), ("its driver", said))
+    }
+    told = "; ".join(f"{names} from {source}" for source, names in whose.items() if names)
+    if limits.velocity_rad_s is None or limits.acceleration_rad_s2 is None:
+        told += ("; " if told else "") + (
+            f"not known: {VELOCITY_RAD_S:g} rad/s and {ACCELERATION_RAD_S2:g} rad/s² are assumed where they are missing"
+            " (to measure them: feelahead-robot --measure-limits)"
+        )
+    return replace(settings, arm_limits=limits), f"the arm's limits: {told}"
 
 
 def _episodes(settings: RobotSettings, arm: MujocoArm | RemoteArm, camera: MujocoCamera) -> Episodes:
@@ -185,18 +207,26 @@ def _episodes(settings: RobotSettings, arm: MujocoArm | RemoteArm, camera: Mujoc
 
 
 def _arm(
-    scene: Scene, encoder: Encoder, limits: MotionLimits, drivers: ConnectedDrivers | None
-) -> tuple[MujocoArm | RemoteArm, tuple[FloatArray, FloatArray], GripperTravel | None]:
-    """Return the arm, simulated or a driver's; its joints' lower and upper ends, (n,) each; the gripper's travel."""
-    if drivers is None or not drivers.has_arm:
-        simulated = MujocoArm(scene, encoder, limits)
-        return simulated, simulated.ends_rad, simulated.travel
+    scene: Scene, encoder: Encoder, settings: RobotSettings, drivers: ConnectedDrivers | None
+) -> tuple[MujocoArm | RemoteArm, JointLimits, GripperTravel | None]:
+    """Return the arm, simulated or a driver's; its joints' limits; the gripper's travel.
+
+    ConfigurationError if the settings give limits for another number of joints.
+    """
     robot, (travel, ends_rad) = scene.robot, stand(scene)
+    joints = len(robot.arm_joints), *ends_rad, _slides(scene)
+    try:
+        limits = settings.arm_limits.of_joints(*joints)
+        moves = limits if settings.simulated_limits is None else settings.simulated_limits.of_joints(*joints)
+    except ValueError as error:
+        raise ConfigurationError(str(error)) from None
+    if drivers is None or not drivers.has_arm:
+        simulated = MujocoArm(scene, encoder, moves)
+        return simulated, limits, simulated.travel
     opening_m = 0.0 if travel is None else float(travel.openings_m[0])
     open_fingers = scene.data.qpos[robot.finger_positions].copy()
-    joints = limits.of_joints(len(robot.arm_joints), *ends_rad, _slides(scene))
-    shape = ArmShape(*joint_names(scene), open_fingers, opening_m, joints, encoder.standard_deviation_rad())
-    return drivers.arm(shape, scene.show), ends_rad, travel
+    shape = ArmShape(*joint_names(scene), open_fingers, opening_m, limits, encoder.standard_deviation_rad())
+    return drivers.arm(shape, scene.show), limits, travel
 
 
 def _slides(scene: Scene) -> BoolArray:

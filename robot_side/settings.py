@@ -12,6 +12,7 @@ from common.command.run_options import SideOptions
 from common.files.plugged import require_name
 from common.limits import check_limits, check_value
 from common.roles import Role
+from robot_side.arm.limits import ArmLimits
 from robot_side.arm.tool_motion import ToolMotionSettings
 from robot_side.drivers.mujoco.built_in_scenes import SceneName
 from robot_side.drivers.mujoco.robot_model import SiteAxis
@@ -94,7 +95,13 @@ class RobotSettings(PaperFlags, SideOptions):
     """Axis of the site along which R2 advances. The start names the axis that fits the fingers, if another one does."""
     arm: Annotated[str | None, tyro.conf.arg(metavar="tcp://HOST:PORT")] = None
     """Address at which the driver of your arm connects; that arm moves instead of a simulated one (docs/drivers.md).
-    --model describes the arm. With --keys the driver needs an allowed key, as an operator does."""
+    --model describes the arm. With --keys the driver needs an allowed key, as an operator does. In a TOML file it is
+    the key address of the table [arm], if that has other keys."""
+    arm_limits: ArmLimits = field(default_factory=ArmLimits)
+    """Limits of the arm's joints; the table [arm.limits] of a TOML file. Those that a driver says count where these are
+    not given."""
+    simulated_limits: Annotated[ArmLimits | None, tyro.conf.Suppress] = None
+    """Only in a TOML file: limits of the simulated arm that [arm.limits] does not know, for experiments."""
     objects: Annotated[str | None, tyro.conf.arg(metavar="tcp://HOST:PORT")] = None
     """Address at which your perception process connects, instead of a simulated camera (docs/drivers.md)."""
     perception: Annotated[str | None, tyro.conf.arg(metavar="NAME|FILE.py")] = None

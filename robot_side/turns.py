@@ -118,7 +118,8 @@ class RobotTurns:
         if process.status.due(now_s):
             process.status.show(now_s, robot=replace(self._status(now_s), **self._times.paced()))
         tuning, episodes = self._core.session.tuning, self._core.session.episodes
-        for text in (*tuning.take_notes(), *episodes.take_notes()):
+        late_stops = self._core.motion.following.stops
+        for text in (*tuning.take_notes(), *episodes.take_notes(), *late_stops.take_notes()):
             process.note(text)
         if (words := tuning.take_link()) is not None:
             self._sending.tune(words)

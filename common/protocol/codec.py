@@ -16,7 +16,7 @@ from common.protocol.view_messages import AnyViewMessage
 
 Kind = TypeVar("Kind")
 
-PROTOCOL_VERSION = 11
+PROTOCOL_VERSION = 12
 """What each version added. 2: the lease, with its token in every command. 3: predicted contact in each stiffness.
 4: a field for each trigger in place of stiffness and contact, and the compensating side in each command. 6: Watch.
 7: packed form of stiffness and telemetry. 8: onset distances around the gripper, and whether the held object is

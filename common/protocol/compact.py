@@ -47,11 +47,14 @@ _PAST: Final = -(2**15)
 _PAST_M: Final = -100.0
 _STATES: Final[tuple[MotionState, ...]] = get_args(MotionState)
 _STANDS, _HINDERED = 4, 8
+_ROUNDING: Final = 1e-6
 _LARGEST_SINGLE: Final = (2.0 - 2.0**-23) * 2.0**127
 
-_STIFFNESS: Final = struct.Struct("<32h10fiBB")
+_STIFFNESS: Final = struct.Struct("<32h10fiBBB")
 """Fields in order: onset distances (L2 fast, L2 slow, R2 fast, R2 slow); v_max, a, δ and s of L2, then of R2; v;
-commanded speed, NaN for None; horizon; rumble; one byte with the state and bits for `stands` and `hindered`."""
+commanded speed, NaN for None; horizon; rumble; one byte with the state and bits for `stands` and `hindered`; the
+response in `_RESPONSES` a second."""
+_RESPONSES: Final = 250.0
 _AROUND: Final = struct.Struct(f"<f{LISTS * PROBES}s")
 """Optional part after _STIFFNESS: `full_s` and `steps` of an Around; its `changes` follow, to the end of the field."""
 
@@ -125,6 +128,7 @@ def _pack_stiffness(update: StiffnessUpdate) -> bytes:
         math.floor(horizon_m * _STEPS),
         math.ceil(8.0 * update.rumble),
         _STATES.index(update.state) + _STANDS * update.stands + _HINDERED * update.hindered,
+        math.ceil(_RESPONSES * update.response_s - _ROUNDING),
     )
     around = update.around
     return field if around is None else field + _AROUND.pack(around.full_s, around.steps) + around.changes
@@ -133,7 +137,7 @@ def _pack_stiffness(update: StiffnessUpdate) -> bytes:
 def _unpack_stiffness(message: StiffnessOnWire) -> StiffnessUpdate:
     content = _STIFFNESS.unpack_from(message.field)
     behind = message.field[_STIFFNESS.size :]
-    speed_m_s, commanded_m_s, horizon, rumble, bits = content[40:]
+    speed_m_s, commanded_m_s, horizon, rumble, bits, response = content[40:]
     state = bits % _STANDS
     if state >= len(_STATES) or bits >= 2 * _HINDERED:
         raise ValueError(f"bits = {bits}; valid: a state from 0 to {len(_STATES) - 1}, and two flags above it")
@@ -154,6 +158,7 @@ def _unpack_stiffness(message: StiffnessOnWire) -> StiffnessUpdate:
         bool(bits & _STANDS),
         bool(bits & _HINDERED),
         _unpack_around(behind) if behind else None,
+        response / _RESPONSES,
     )
 
 

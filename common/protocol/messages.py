@@ -7,7 +7,7 @@
 A field out of range or not finite makes the whole message invalid: no part is applied.
 """
 
-from typing import Annotated, Literal
+from typing import Annotated, Final, Literal
 
 import msgspec
 from msgspec import Meta
@@ -235,6 +235,9 @@ class TriggerField(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_
         in_range("course_stiffness", 0.0, 1.0, self.course_stiffness)
 
 
+LONGEST_RESPONSE_S: Final = 1.02
+
+
 class StiffnessUpdate(Message, frozen=True, tag="stiffness"):
     """Trigger fields (§4.2), which the operator side renders as strengths over each trigger's travel."""
 
@@ -257,9 +260,12 @@ class StiffnessUpdate(Message, frozen=True, tag="stiffness"):
     """Whether something keeps the arm from following the command (`Telemetry.hindrance`)."""
     around: Around | None = None
     """Onset distances around the gripper. Only a few messages have them; they hold until the next."""
+    response_s: float = 0.0
+    """Time from a command's arrival at the robot side until the arm follows it; the wire holds it in steps of 4 ms."""
 
     def __post_init__(self) -> None:
         in_range("speed_m_s", -FARTHEST_M, FARTHEST_M, self.speed_m_s)
+        in_range("response_s", 0.0, LONGEST_RESPONSE_S, self.response_s)
         if self.commanded_m_s is not None:
             in_range("commanded_m_s", -FARTHEST_M, FARTHEST_M, self.commanded_m_s)
         in_range("horizon_m", 0.0, FARTHEST_M, self.horizon_m)

@@ -63,6 +63,8 @@ class Report(NamedTuple):
     """v_max: speed that full travel commands"""
     commanded_m_s: float | None = None
     """Speed that the robot side gives the newest command it had received, within its limits; None: as commanded"""
+    response_s: float = 0.0
+    """Time from a command's arrival at the robot side until the arm follows it"""
 
 
 class Course(NamedTuple):
@@ -99,6 +101,9 @@ class CommandsUnderWay:
     u(t) = x(t) v_max, for t from e to now. x(t) is the travel of the newest command sent at or before t:
 
         δ = ∫ v dt,  w = v(now),  |dv/dt| <= a
+
+    Real drives respond later: the arm follows a command from `response_s` after its arrival on. Then v answers the
+    commands that were sent before e - response_s, and δ counts from there.
 
     This is exact, as u is constant between commands. Two errors remain: d varies from message to message, and an arm
     at the edge of its workspace does not follow. `feelahead bench error` measures both together. `displacement` takes
@@ -180,7 +185,7 @@ class CommandsUnderWay:
 
     def _counting(self, now_s: float, report: Report) -> list[Command] | None:
         """List the commands in force from e to `now_s`, oldest first, then a last entry at `now_s`; None if unknown."""
-        echo_sent_s, held_s, speed_m_s, full_speed_m_s, commanded_m_s = report
+        echo_sent_s, held_s, speed_m_s, full_speed_m_s, commanded_m_s, response_s = report
         if not math.isfinite(speed_m_s):
             raise ValueError(f"speed_m_s = {speed_m_s}; valid: finite")
         if not (math.isfinite(full_speed_m_s) and full_speed_m_s > 0.0):
@@ -191,10 +196,12 @@ class CommandsUnderWay:
             return None
         if not 0.0 <= held_s <= now_s - echo_sent_s + _CLOCK_RATES_S:
             return None
-        followed, *under_way = self._from(echo_sent_s, now_s)
-        since_s = min(echo_sent_s + held_s, under_way[0].sent_s if under_way else now_s)
-        travel = followed.travel if commanded_m_s is None else commanded_m_s / full_speed_m_s
-        return [followed._replace(sent_s=since_s, travel=travel), *under_way, Command(now_s, 0.0)]
+        newest, *under_way = self._from(echo_sent_s, now_s)
+        since_s = min(echo_sent_s + held_s, under_way[0].sent_s if under_way else now_s) - response_s
+        travel = newest.travel if commanded_m_s is None else commanded_m_s / full_speed_m_s
+        earlier = self._from(since_s, echo_sent_s)[:-1] if response_s > 0.0 else []
+        followed = [one._replace(sent_s=max(one.sent_s, since_s)) for one in (*earlier, newest._replace(travel=travel))]
+        return [*followed, *under_way, Command(now_s, 0.0)]
 
     def _from(self, since_s: float, until_s: float) -> list[Command]:
         """List the command in force at `since_s` and all later ones until `until_s`, oldest first."""

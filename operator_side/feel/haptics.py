@@ -175,6 +175,5 @@ class Haptics:
 
 def _report(update: StiffnessUpdate) -> Report:
     header = update.header
-    return Report(
-        header.echo_sent_s, header.echo_held_s, update.speed_m_s, update.r2.full_speed_m_s, update.commanded_m_s
-    )
+    echo = header.echo_sent_s, header.echo_held_s
+    return Report(*echo, update.speed_m_s, update.r2.full_speed_m_s, update.commanded_m_s, update.response_s)

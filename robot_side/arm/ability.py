@@ -1,11 +1,11 @@
 """Speed and acceleration that the tool can reach along a direction in one pose, within the joints' limits."""
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
-from common.arrays import BoolArray, FloatArray
+from common.arrays import FloatArray
+from robot_side.arm.limits import JointLimits
 from robot_side.arm.port import GripperPose
 from robot_side.arm.resolved_rate import joint_velocities, velocities_for
 
@@ -14,29 +14,6 @@ _MET = 1e-6
 _LEAST_SPEED_M_S = 1e-6
 _LEAST_S = 1e-9
 _NO_TURN = np.zeros(3)
-
-
-@dataclass(frozen=True)
-class JointLimits:
-    """Limits of the joints in the arm's own controller, (n,) each; metres instead of radians for a prismatic joint."""
-
-    velocity_rad_s: FloatArray
-    acceleration_rad_s2: FloatArray
-    lower_rad: FloatArray | None = None
-    """Lower end of each joint's range; None if all are unknown or without ends"""
-    upper_rad: FloatArray | None = None
-
-    slides: BoolArray | bool = False
-    """Whether each joint slides"""
-
-    @cached_property
-    def ends_rad(self) -> tuple[FloatArray, FloatArray]:
-        """Lower and upper ends of the joints' ranges; infinite if not given."""
-        infinite = np.full(self.velocity_rad_s.size, np.inf)
-        return (
-            -infinite if self.lower_rad is None else np.ascontiguousarray(self.lower_rad),
-            infinite if self.upper_rad is None else np.ascontiguousarray(self.upper_rad),
-        )
 
 
 @dataclass(frozen=True)

@@ -7,8 +7,8 @@ import numpy as np
 
 from common.arrays import FloatArray, require_finite
 from common.protocol.messages import MotionCommand
-from robot_side.arm.ability import JointLimits
 from robot_side.arm.hindrance import Cause
+from robot_side.arm.limits import JointLimits
 from robot_side.arm.port import GripperPose
 from robot_side.arm.resolved_rate import is_damped, joint_velocities
 from robot_side.arm.tool_motion import ToolMotionSettings, tool_motion

@@ -13,9 +13,11 @@ from typing import Any, Final
 import numpy as np
 
 from common.arrays import BoolArray, FloatArray
-from robot_side.arm.ability import JointLimits
 from robot_side.arm.commanded import LEVER_M
 from robot_side.arm.joint_tracking import CLOCK, TRACK, Fault, track
+from robot_side.arm.late_stops import LateStops
+from robot_side.arm.limits import JointLimits
+from robot_side.arm.load_limit import LoadLimit
 from robot_side.arm.port import ArmState, GripperPose
 
 NOTICED_RAD: Final = 0.02
@@ -62,6 +64,8 @@ class Following:
         self._noticed: Counter[str] = Counter()
         self._held = 0
         self._touches, self._asked_s = np.zeros(count, dtype=bool), np.full(count, -math.inf)
+        self.stops = LateStops(limits, self._names, sigma_rad)
+        self.loads = LoadLimit(limits, self._names)
         self.restart()
 
     def restart(self) -> None:
@@ -86,6 +90,7 @@ class Following:
         command = self._still if commanded_rad_s is None else commanded_rad_s
         limits, given = self._limits, (command, state.joint_positions_rad, loads)
         ends = *limits.ends_rad, limits.acceleration_rad_s2
+        self.stops.update(command, state, late_s)
         if track(self._tracks, self._clock, *given, *ends, time_s, late_s):
             self._judge(state.joint_loads_nm is None, touches, time_s)
         elif self.text is not None:

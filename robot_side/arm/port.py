@@ -36,6 +36,8 @@ class ArmState:
     """Simulated time, which slow physics lets fall behind `time_s`; None if nothing is simulated"""
     doubt: str | None = None
     """Why the arm must not move by this state, in words; None if nothing speaks against it"""
+    condition: str | None = None
+    """Why the arm's own controller lets nothing move, in words: a protective stop, say; None if it is ready"""
 
 
 class Arm(Protocol):

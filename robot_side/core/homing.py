@@ -16,7 +16,7 @@ import numpy as np
 from common.arrays import FloatArray
 from common.protocol.messages import MotionCommand
 from common.roles import Role
-from robot_side.arm.ability import JointLimits
+from robot_side.arm.limits import JointLimits
 from robot_side.arm.port import ArmState, GripperKinematics
 from robot_side.gripper.grip import Grip
 from robot_side.surroundings.distances import object_distances

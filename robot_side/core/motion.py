@@ -5,10 +5,10 @@ from typing import Final
 import numpy as np
 
 from common.arrays import FloatArray
-from robot_side.arm.ability import JointLimits
 from robot_side.arm.commanded import commanded
 from robot_side.arm.following import Following
 from robot_side.arm.hindrance import Hindrance
+from robot_side.arm.limits import JointLimits
 from robot_side.arm.port import Arm, ArmState, GripperPose
 from robot_side.arm.speed_assist import assisted
 from robot_side.arm.tool_motion import ToolMotionSettings

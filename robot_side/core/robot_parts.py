@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 from common.arrays import FloatArray
 from common.timing.ages import LoopAge
-from robot_side.arm.ability import JointLimits
 from robot_side.arm.following import Following
+from robot_side.arm.limits import JointLimits
 from robot_side.arm.port import Arm, GripperKinematics
 from robot_side.arm.stick_frames import StickFrames
 from robot_side.arm.tool_motion import ToolMotionSettings

@@ -97,10 +97,9 @@ class RobotSide:
         begin("arm")
         self._measured = parts.arm.state(now_s)
         begin("pose")
-        late_s, doubt = lateness_s(self._measured, now_s), self._measured.doubt
-        following = self.motion.following
+        late_s, following = lateness_s(self._measured, now_s), self.motion.following
         following.update(self.motion.commanded_rad_s, self._measured, late_s, self._touches)
-        delay_s = self._follow_operator(now_s, late_s, doubt)
+        delay_s = self._follow_operator(now_s, late_s, self._measured)
         self._joints.update(self._measured)
         state = self._joints.carried(late_s)
         pose = parts.kinematics.pose(state)
@@ -131,6 +130,8 @@ class RobotSide:
             held=grip.index,
             lateral=(0.0, 0.0) if command is None else command.lateral,
             astray_m_s=following.tool_error_m_s(pose),
+            response_s=parts.limits.response_s,
+            later_s=following.stops.later_s,
         )
         sensed = parts.law.sense(situation, now_s)
         self.newest = sensed, situation
@@ -142,24 +143,27 @@ class RobotSide:
         self._found = Found(*found, holds_target, sight.target_m)
         return outgoing
 
-    def _follow_operator(self, now_s: float, late_s: float, doubt: str | None) -> float:
+    def _follow_operator(self, now_s: float, late_s: float, state: ArmState) -> float:
         """Update the lease's owner and the loop age; return the loop age t_d of eq. 8.
 
-        late_s: lateness of the arm's states, in seconds. Commands take about as long to reach the arm, so it is added.
-        doubt: of the newest state.
+        late_s: lateness of the arm's states, in seconds. Commands take about as long to reach the arm, so it is added,
+        and so is the time in which the arm's drives respond.
         """
         session, loop_age = self.session, self.parts.loop_age
         session.update(now_s)
         session.safety.arm_measured(late_s, now_s)
-        stop = self.motion.following.stop
-        session.safety.arm_followed(doubt if stop is None else f"the arm does not follow: {stop}", now_s)
+        following, safety = self.motion.following, session.safety
+        stop = following.stop
+        safety.arm_followed(state.doubt if stop is None else f"the arm does not follow: {stop}", now_s)
+        safety.arm_stopped(state.condition, now_s)
+        safety.arm_loaded(following.loads.over(state, armed=safety.state == "armed"), now_s)
         if session.take_owner_changed():
             loop_age.reset()
             self.reports.begin_epoch()
         if (age_s := session.loop_age_s(now_s)) is None:
             return loop_age.value(now_s)
         # In every tick, so that a link that falls silent ages, too (eq. 8).
-        return loop_age.update(age_s + late_s, now_s)
+        return loop_age.update(age_s + late_s + self.parts.limits.response_s, now_s)
 
     def _touches(self, joint: int) -> bool:
         """Return whether what `joint` (from 0) moves may touch something, as far as errors allow.
@@ -256,6 +260,7 @@ class RobotSide:
                 "stale": self.session.stale,
             },
             "following": self.motion.following.summary(),
+            "late_stops": self.motion.following.stops.summary(),
             "lease": self.session.summary(),
             "episodes": self.session.episodes.summary(),
             "delay_ms": {"to_robot": self.session.link.delay.summary_ms()},

@@ -51,6 +51,7 @@ def differs(seen: Seen, last: Seen) -> bool:
         or (now.lateral == (0.0, 0.0)) != (then.lateral == (0.0, 0.0))
         or any(abs(one - other) > _SAME_STICK for one, other in sticks)
         or abs(now.astray_m_s - then.astray_m_s) > STILL_M_S
+        or now.later_s != then.later_s
     )
 
 

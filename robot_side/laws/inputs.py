@@ -8,7 +8,8 @@ import numpy as np
 from common.arrays import FloatArray, IntArray
 from common.protocol.uniform_field import FAR_M, STRENGTHS, uniform_field
 from common.roles import Role
-from robot_side.arm.ability import JointLimits, along_approach
+from robot_side.arm.ability import along_approach
+from robot_side.arm.limits import JointLimits
 from robot_side.arm.tool_motion import ToolMotionSettings
 from robot_side.enlargement.distance import Uncertainty
 from robot_side.field.object_class import OBSTACLE, SKIPPED

@@ -8,7 +8,8 @@ import numpy as np
 
 from common.arrays import FloatArray, IntArray
 from common.reaction import HORIZON_S
-from robot_side.arm.ability import Ability, JointLimits, ability
+from robot_side.arm.ability import Ability, ability
+from robot_side.arm.limits import JointLimits
 from robot_side.arm.port import GripperPose
 from robot_side.arm.tool_motion import ToolMotionSettings
 from robot_side.enlargement.distance import Uncertainty
@@ -110,6 +111,7 @@ def _along(
         mean_m, sd_m = uncertainty.prediction.at(situation.compensation, age_s, able.full_speed_m_s)
     # Until it stands, an arm that does not follow goes on as it now does.
     mean_m += situation.astray_m_s * (age_s + able.full_speed_m_s / able.acceleration_m_s2)
+    mean_m += situation.later_s * able.full_speed_m_s
     velocities_m_s, approach_m = situation.objects.velocities_m_s, None
     if velocities_m_s is not None and velocities_m_s.any():
         closing_m_s = np.maximum(-(velocities_m_s @ direction), 0.0)

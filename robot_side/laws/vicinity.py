@@ -43,7 +43,8 @@ def farthest_m(situation: Situation, motion: GripperMotion, assumed: Assumed, en
     per_rad_m = np.sqrt((jacobian[:3] ** 2).sum(axis=0)) + levers_m * np.sqrt((jacobian[3:] ** 2).sum(axis=0))
     missed = assumed.uncertainty
     mean_m, sd_m = missed.prediction.at(situation.compensation, age_s, full_speed_m_s)
-    mean_m = abs(mean_m) + math.hypot(*missed.mean_m) + abs(situation.astray_m_s) * (age_s + change_s)
+    late_m = abs(situation.astray_m_s) * (age_s + change_s) + situation.later_s * full_speed_m_s
+    mean_m = abs(mean_m) + math.hypot(*missed.mean_m) + late_m
     sd_m = math.hypot(_length(encoder_sigma_rad * per_rad_m), missed.camera_sd_m, sd_m)
     # Twice: errors inflate the spheres, and those along the motion shorten the way.
     errors_m = 2.0 * (mean_m + abs(missed.quantile) * sd_m)

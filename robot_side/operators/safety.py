@@ -176,6 +176,26 @@ class Safety:
         if stop is not None:
             self._handle(SessionEvent.ASTRAY, now_s, stop)
 
+    def arm_stopped(self, why: str | None, now_s: float) -> None:
+        """Stop the arm as an emergency stop does, while its own controller lets nothing move; in every tick.
+
+        why: in words; None if it is ready. Nobody can arm until it is, and then has to.
+        """
+        if why is None:
+            return
+        self._arm_astray = True
+        self._stopped = True
+        if self._session is not None and self._session.state is not SessionState.STOPPED:
+            self._handle(SessionEvent.EMERGENCY_STOP, now_s, why)
+
+    def arm_loaded(self, over: str | None, now_s: float) -> None:
+        """Stop an armed arm whose load is over its limit; it may be armed again.
+
+        over: which load, in words; None if none is.
+        """
+        if over is not None:
+            self._handle(SessionEvent.ASTRAY, now_s, over)
+
     def check(self, now_s: float) -> None:
         """Stop the arm if the gap or the loop age is beyond its limit."""
         self._check_gap(now_s)

@@ -9,7 +9,7 @@ import numpy as np
 from common.arrays import FloatArray
 from common.protocol.around import Around
 from common.protocol.codec import encode
-from common.protocol.messages import Header, MotionState, StiffnessUpdate, Telemetry
+from common.protocol.messages import LONGEST_RESPONSE_S, Header, MotionState, StiffnessUpdate, Telemetry
 from robot_side.arm.hindrance import Hindrance
 from robot_side.arm.port import ArmState, GripperPose
 from robot_side.arm.stick_frames import StickFrames
@@ -54,11 +54,12 @@ def stiffness_message(
     stands: bool = False,
     hindered: bool = False,
     around: Around | None = None,
+    response_s: float = 0.0,
 ) -> Outgoing:
     """Return the stiffness message for `receiver`; commanded_m_s: commanded speed along R2's direction.
 
     stands: whether the held object stands on something. hindered: whether something keeps the arm from following.
-    around: the map, if one is due in this message.
+    around: the map, if one is due in this message. response_s: `JointLimits.response_s`.
     """
     update = StiffnessUpdate(
         receiver.header,
@@ -72,6 +73,7 @@ def stiffness_message(
         stands=stands,
         hindered=hindered,
         around=around,
+        response_s=min(response_s, LONGEST_RESPONSE_S),
     )
     return Outgoing("haptics", receiver.peer, encode(update), receiver.everywhere)
 

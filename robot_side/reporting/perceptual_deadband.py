@@ -14,7 +14,8 @@ millimetres.
 """
 
 import math
-from dataclasses import dataclass
+from collections import deque
+from dataclasses import dataclass, field
 from typing import Any, Final
 
 from common.following import follow
@@ -50,9 +51,25 @@ class _Belief:
     """Time of the last update"""
     displacement_m: float = 0.0
     """Distance along R2 that the receiver assumes since the message"""
+    later: deque[tuple[float, float]] = field(default_factory=deque)
+    """Times and targets that the drives have not responded to yet"""
 
     def advance(self, now_s: float) -> None:
         """Carry the receiver's assumed motion to `now_s`."""
+        while self.later and self.later[0][0] <= now_s:
+            at_s, target_m_s = self.later.popleft()
+            self._follow(max(at_s, self.now_s))
+            self.target_m_s = target_m_s
+        self._follow(now_s)
+
+    def expect(self, target_m_s: float, at_s: float) -> None:
+        """Follow a target from `at_s` on, which may be now."""
+        if at_s <= self.now_s:
+            self.target_m_s = target_m_s
+        elif target_m_s != (self.later[-1][1] if self.later else self.target_m_s):
+            self.later.append((at_s, target_m_s))
+
+    def _follow(self, now_s: float) -> None:
         acceleration_m_s2, passed_s = self.sensed.r2.acceleration_m_s2, now_s - self.now_s
         moved = follow(self.displacement_m, self.speed_m_s, self.target_m_s, acceleration_m_s2, passed_s)
         (self.displacement_m, self.speed_m_s), self.now_s = moved, now_s
@@ -64,6 +81,8 @@ class StiffnessDeadband:
     def __init__(self, *, full_rate: bool = False) -> None:
         """full_rate: send a stiffness message in every tick."""
         self._full_rate = full_rate
+        self.response_s = 0.0
+        """Time from a command's arrival until the arm follows it"""
         self.interval_s = 0.0
         """Minimum time between two stiffness messages, in s, set by the link's rate; a change of state never waits."""
         self._belief: _Belief | None = None
@@ -99,9 +118,15 @@ class StiffnessDeadband:
             if not self._full_rate and not _matters(belief, sensed, states, *waits):
                 # The receiver does not know yet how fast the arm follows a later command.
                 later_m_s = travel * belief.sensed.r2.full_speed_m_s
-                belief.target_m_s = belief.commanded_m_s if obeyed == belief.obeyed else later_m_s
+                target_m_s = belief.commanded_m_s if obeyed == belief.obeyed else later_m_s
+                belief.expect(target_m_s, now_s + self.response_s)
                 return False
-        self._belief = _Belief(sensed, now_s, states, obeyed, commanded_m_s, commanded_m_s, sensed.speed_m_s, now_s)
+        before_m_s, later = commanded_m_s, deque[tuple[float, float]]()
+        if self.response_s > 0.0 and belief is not None:
+            before_m_s, later = belief.target_m_s, belief.later
+        self._belief = _Belief(sensed, now_s, states, obeyed, commanded_m_s, before_m_s, sensed.speed_m_s, now_s)
+        self._belief.later = later
+        self._belief.expect(commanded_m_s, now_s + self.response_s)
         return True
 
 

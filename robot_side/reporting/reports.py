@@ -66,13 +66,18 @@ class Reports:
         content = sensed, commanded_m_s, permission.state, stands, hindered
         outgoing = [Outgoing("haptics", *answer) for answer in session.take_answers(now_s)]
         self.turns_with_owner += session.owner_peer is not None
+        self.deadband.response_s = situation.response_s
         if session.owner_peer is not None and self.deadband.due(*content, permission.command, now_s):
             self.stiffness_sent += 1
             around = self._around.due(situation.pose, now_s)
-            outgoing += [stiffness_message(one, *content, around) for one in session.owners(now_s)]
+            outgoing += [
+                stiffness_message(one, *content, around, situation.response_s) for one in session.owners(now_s)
+            ]
         if now_s >= self._next_observers_s:
             self._next_observers_s = now_s + OBSERVER_PERIOD_S
-            outgoing += [stiffness_message(one, *content) for one in session.observers(now_s)]
+            outgoing += [
+                stiffness_message(one, *content, None, situation.response_s) for one in session.observers(now_s)
+            ]
         return outgoing
 
     def telemetry(

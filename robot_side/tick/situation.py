@@ -33,3 +33,7 @@ class Situation:
     """Commanded deflection, right and up, of the stick that moves the tool across its approach axis"""
     astray_m_s: float = 0.0
     """Error of the tool's predicted velocity, while the arm does not follow (see `arm/following.py`)"""
+    response_s: float = 0.0
+    """Time from a command's arrival until the arm follows it, which `loop_age_s` contains (`JointLimits.response_s`)"""
+    later_s: float = 0.0
+    """Time by which the arm stops later than its limits say (see `arm/late_stops.py`)"""

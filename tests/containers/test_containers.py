@@ -128,7 +128,7 @@ def test_a_trial_of_the_latency_experiment(compose: Compose, tmp_path: Path) -> 
     for trial in trials.values():
         assert min(trial["to_robot_samples"], trial["to_operator_samples"]) > 0
     assert trials["virtual"]["contact_speed_mm_s"] is not None
-    # In real time: a busy machine may hold up a command, and then the arm stops or is never armed. So this is only told.
+    # In real time a busy machine may hold up commands, so that the arm stops or is never armed: this is only told.
     in_containers = trials["containers"]
     print({name: in_containers[name] for name in ("contact_speed_mm_s", "min_distance_mm", "stops")})
     assert compose.existing(f"name={TRIALS}") <= before

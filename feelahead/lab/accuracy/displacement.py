@@ -21,8 +21,8 @@ from feelahead.lab.interleaved import in_turns, processor_us
 from feelahead.lab.posed_gripper import PosedGripper
 from feelahead.lab.questions.error import link_spec
 from feelahead.lab.table import Row
+from robot_side.arm.limits import ArmLimits
 from robot_side.arm.tool_motion import ToolMotionSettings
-from robot_side.drivers.mujoco.joint_reference import MotionLimits
 from robot_side.drivers.mujoco.scene import load_scene
 
 TURNS_S: Final = (PERIODS_S[0], TURN_S, 0.010)
@@ -38,7 +38,7 @@ def measure(delay_ms: int, pulls: Sequence[PullKind], seconds: float, rounds: in
     """Measure the predictions of δ by both sides, for pulls over a link with this delay each way."""
     errors_m: dict[str, list[FloatArray]] = {"operator": [], "robot": []}
     works: dict[str, list[Callable[[], object]]] = {"operator": [], "robot": []}
-    count, full_m_s, limits = 0, ToolMotionSettings().trigger_speed_m_s, MotionLimits()
+    count, full_m_s, limits = 0, ToolMotionSettings().trigger_speed_m_s, ArmLimits()
     for pull in pulls:
         record = record_approach(pull, link_spec(delay_ms), seed, seconds, "empty")
         judged = judge(record, _gripper().at, limits, full_m_s)

@@ -20,8 +20,9 @@ from operator_side.dualsense.simulated.trigger_model import (
     SPRING_RISE_N,
 )
 from operator_side.hands.travel_calibration import TravelCalibration
+from robot_side.arm.limits import ACCELERATION_RAD_S2, DECELERATION_RAD_S2, VELOCITY_RAD_S
 from robot_side.arm.tool_motion import ToolMotionSettings
-from robot_side.drivers.mujoco.joint_reference import MotionLimits
+from robot_side.drivers.mujoco.joint_reference import WINDUP_RAD
 from robot_side.settings import CameraSettings, EncoderSettings
 
 SCENES: Final = Path(__file__).parents[3] / "tests" / "data"
@@ -78,7 +79,12 @@ def frozen_values() -> dict[str, Any]:
             "strengths": MAX_STRENGTH,
         },
         "travel": asdict(TravelCalibration()),
-        "arm": asdict(MotionLimits()),
+        "arm": {
+            "velocity_rad_s": VELOCITY_RAD_S,
+            "acceleration_rad_s2": ACCELERATION_RAD_S2,
+            "deceleration_rad_s2": DECELERATION_RAD_S2,
+            "windup_rad": WINDUP_RAD,
+        },
         "tool": asdict(ToolMotionSettings()),
         "camera": asdict(CameraSettings()),
         "encoder": asdict(EncoderSettings()),

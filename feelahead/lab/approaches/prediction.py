@@ -15,8 +15,8 @@ from feelahead.lab.approaches.recording import RecordedApproach
 from feelahead.lab.table import Row, Table
 from operator_side.feel.commands_under_way import CommandsUnderWay, Report
 from robot_side.arm.ability import along_approach
+from robot_side.arm.limits import ArmLimits
 from robot_side.arm.port import GripperPose
-from robot_side.drivers.mujoco.joint_reference import MotionLimits
 
 COMPENSATIONS: Final[tuple[Compensation, ...]] = get_args(Compensation)
 """operator: the commands under way, known by their sender. robot: v t_d with the robot's high quantile of the loop age
@@ -33,7 +33,7 @@ PoseAt = Callable[[FloatArray], GripperPose]
 class ToolPath:
     """Position of the tool over time in the world frame, interpolated between the recorded poses."""
 
-    def __init__(self, record: RecordedApproach, pose_at: PoseAt, limits: MotionLimits, full_speed_m_s: float) -> None:
+    def __init__(self, record: RecordedApproach, pose_at: PoseAt, limits: ArmLimits, full_speed_m_s: float) -> None:
         """record: its true joints are followed. limits, full_speed_m_s: decide what is within the arm's reach."""
         poses = [pose_at(joints) for joints in record.joint_positions_rad]
         able = [along_approach(pose, limits.of_joints(pose.tool_jacobian.shape[1]), full_speed_m_s) for pose in poses]
@@ -144,7 +144,7 @@ def predicted(
     return onsets_m, speeds
 
 
-def judge(record: RecordedApproach, pose_at: PoseAt, limits: MotionLimits, full_speed_m_s: float) -> Row:
+def judge(record: RecordedApproach, pose_at: PoseAt, limits: ArmLimits, full_speed_m_s: float) -> Row:
     """Compare every prediction with the arm's true displacement. full_speed_m_s: v_max of the settings.
 
     Return lists (k,), an entry for each judged time: `loop_age_s`, `within_reach`, `displacement_m` and the errors.

@@ -13,10 +13,10 @@ from operator_side.dualsense.simulated.trigger_model import FINGER_TIME_CONSTANT
 from operator_side.feel.commands_under_way import CommandsUnderWay
 from operator_side.hands.travel_calibration import TriggerTravel
 from robot_side.arm.joint_estimate import JointEstimate
+from robot_side.arm.limits import ACCELERATION_RAD_S2
 from robot_side.arm.port import ArmState, GripperPose
 from robot_side.arm.tool_motion import ToolMotionSettings, tool_motion
 from robot_side.drivers.mujoco.encoders import Encoder
-from robot_side.drivers.mujoco.joint_reference import MotionLimits
 from robot_side.drivers.mujoco.kinematics import MujocoKinematics
 from robot_side.drivers.mujoco.scene import Scene
 from robot_side.settings import EncoderSettings
@@ -133,7 +133,7 @@ class Replay:
         if arrives_s > self.end_s:
             return None
         joints_rad, velocities_rad_s = self.joints_at(arrives_s)
-        braking_s = float(np.abs(velocities_rad_s).max()) / MotionLimits().acceleration_rad_s2
+        braking_s = float(np.abs(velocities_rad_s).max()) / ACCELERATION_RAD_S2
         travel = float(self.record.travel[self.record.tick_row(released_s), 1])
         rests_s = arrives_s + FINGER_TIME_CONSTANT_S + braking_s
         return arrives_s, rests_s, joints_rad + velocities_rad_s * coasting_s(braking_s, travel)

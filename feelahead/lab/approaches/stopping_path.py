@@ -9,8 +9,8 @@ from scipy.spatial.transform import Rotation
 from common.arrays import FloatArray
 from common.reaction import HORIZON_S
 from feelahead.lab.approaches.replay import Replay
+from robot_side.arm.limits import ACCELERATION_RAD_S2
 from robot_side.arm.resolved_rate import joint_velocities
-from robot_side.drivers.mujoco.joint_reference import MotionLimits
 from robot_side.drivers.mujoco.posed_scene import ToolPath
 
 _STEP_S: Final = 0.005
@@ -50,4 +50,4 @@ def stopping_path(replay: Replay, time_s: float, speed_m_s: float, share: float 
 def _changing_s(jacobian: FloatArray, change: FloatArray) -> float:
     """Return the time in seconds that the joints, all in proportion, need to change the tool's twist by `change`."""
     unlimited = np.full(jacobian.shape[1], np.inf)
-    return float(np.abs(joint_velocities(jacobian, change, unlimited)).max()) / MotionLimits().acceleration_rad_s2
+    return float(np.abs(joint_velocities(jacobian, change, unlimited)).max()) / ACCELERATION_RAD_S2

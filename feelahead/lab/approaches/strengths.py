@@ -17,7 +17,7 @@ from operator_side.feel.commands_under_way import Displacement, Report
 from operator_side.feel.path_ahead import CourseOnMap
 from operator_side.feel.rendering import RenderingSettings, TriggerRendering
 from operator_side.hands.travel_calibration import TravelCalibration, TriggerTravel
-from robot_side.drivers.mujoco.joint_reference import MotionLimits
+from robot_side.arm.limits import ArmLimits
 from robot_side.enlargement.distance import Uncertainty
 from robot_side.enlargement.prediction_errors import BUILT_IN, PredictionErrors, load_prediction_errors
 from robot_side.laws.inputs import LawInputs
@@ -104,7 +104,7 @@ class Judged:
     def _law(self, draw: Draw) -> Law:
         replay = draw.replay
         uncertainty = Uncertainty(self.probability, camera_sd_m=draw.camera_sd_m, prediction=_prediction_errors())
-        limits = MotionLimits().of_joints(replay.joints)
+        limits = ArmLimits().of_joints(replay.joints)
         inputs = LawInputs(uncertainty, replay.encoder_sigma_rad, limits, replay.motion, Surroundings(), self.paper)
         if self.law == "swept_robot":
             return SweptLaw(inputs)

@@ -31,8 +31,8 @@ from feelahead.lab.posed_gripper import PosedGripper
 from feelahead.lab.sweep import Question, Sweep
 from feelahead.lab.table import Row, Table
 from feelahead.printing.figures import shown
+from robot_side.arm.limits import ArmLimits
 from robot_side.arm.tool_motion import ToolMotionSettings
-from robot_side.drivers.mujoco.joint_reference import MotionLimits
 from robot_side.drivers.mujoco.scene import load_scene
 
 DELAYS_MS: Final = (0, 25, 50, 100, 200, 400)
@@ -93,7 +93,7 @@ def cells(settings: ErrorSettings) -> Iterator[Prediction]:
 def run(cell: Prediction, seed: int) -> Iterator[Row]:
     """Yield one row: figures of the prediction errors, and their values at each moment."""
     record = record_approach(cell.pull, cell.link, seed, cell.duration_s, _SCENE)
-    judged = judge(record, _gripper().at, MotionLimits(), ToolMotionSettings().trigger_speed_m_s)
+    judged = judge(record, _gripper().at, ArmLimits(), ToolMotionSettings().trigger_speed_m_s)
     found = Table([judged])
     figures = {
         f"{kind}_{name}": value

@@ -9,6 +9,7 @@ import numpy as np
 from common.arrays import FloatArray
 from common.clock import Clock
 from common.errors import FeelaheadError
+from robot_side.arm.limits import ArmLimits, JointLimits
 from robot_side.arm.port import ArmState
 from robot_side.drivers.mujoco.drives.actuators import moves_any
 from robot_side.drivers.mujoco.drives.joint_drives import hold_idle
@@ -16,8 +17,8 @@ from robot_side.drivers.mujoco.encoders import Encoder
 from robot_side.drivers.mujoco.gripper_measurement import GripperTravel, measure_gripper
 from robot_side.drivers.mujoco.hand.gripper_drive import GRIPPER, GRIPPER_INPUT, GripperDrive
 from robot_side.drivers.mujoco.hand.gripper_sweep import STROKE_TIME_S
-from robot_side.drivers.mujoco.joint_reference import JointReference, MotionLimits
-from robot_side.drivers.mujoco.plant import LIMITS, PLANT, Plant, drive, inertia_table, sense
+from robot_side.drivers.mujoco.joint_reference import WINDUP_RAD, JointReference
+from robot_side.drivers.mujoco.plant import PLANT, Plant, drive, inertia_table, sense
 from robot_side.drivers.mujoco.scene import Scene
 
 _LONGEST_ADVANCE_S = 2.0
@@ -59,10 +60,11 @@ class MujocoArm:
         self,
         scene: Scene,
         encoder: Encoder,
-        limits: MotionLimits | None = None,
+        limits: JointLimits | None = None,
         gripper_stroke_time_s: float = STROKE_TIME_S,
+        windup_rad: float = WINDUP_RAD,
     ) -> None:
-        """Begin at the scene's start, with the gripper open.
+        """Begin at the scene's start, with the gripper open. limits: the default ones if None.
 
         ConfigurationError for a gripper actuator whose range of inputs is not known.
         """
@@ -81,10 +83,10 @@ class MujocoArm:
         travel = self.travel
         self._gripper = None if travel is None else GripperDrive(travel, gripper_stroke_time_s)
         start = data.qpos[robot.arm_positions].copy()
-        limits = limits or MotionLimits()
+        limits = limits or ArmLimits().of_joints(len(robot.arm_joints))
         friction, dry = (values[robot.arm_velocities] for values in (model.dof_damping, model.dof_frictionloss))
-        windup_rad = robot.drives.windup_rad(limits.windup_rad, dry)
-        self._reference = JointReference(start, *self.ends_rad, limits, windup_rad, robot.drives.yield_rad())
+        leads_rad = robot.drives.windup_rad(windup_rad, dry)
+        self._reference = JointReference(start, *self.ends_rad, limits, leads_rad, robot.drives.yield_rad())
         mujoco.mj_forward(model, data)
         of_arm = [actuator for actuator in range(model.nactuator) if moves_any(model, actuator, robot.arm_joints)]
         hold_idle(model, data, np.union1d(of_arm, robot.gripper_actuators).astype(np.int64))
@@ -114,7 +116,6 @@ class MujocoArm:
             data.actuator_length,
             data.actuator_velocity,
             data.ctrl,
-            np.array([(limits.velocity_rad_s, limits.acceleration_rad_s2, limits.deceleration_rad_s2)], LIMITS),
         )
         self._addresses = PLANT.bundle(self._plant)
         self._start = mujoco.MjData(model)

@@ -1,15 +1,13 @@
 """References of joints that follow a commanded velocity, and stop by themselves when the command expires."""
 
 import math
-from dataclasses import dataclass
-from typing import Annotated, Any, Final
+from collections import deque
+from typing import Any, Final
 
 import numpy as np
-from msgspec import Meta
 
-from common.arrays import BoolArray, FloatArray
-from common.limits import check_limits
-from robot_side.arm.ability import JointLimits
+from common.arrays import FloatArray
+from robot_side.arm.limits import JointLimits
 from robot_side.compiled.kernel import building_block
 
 REFERENCE: Final = np.dtype(
@@ -27,43 +25,20 @@ REFERENCE: Final = np.dtype(
         ("to_lower", np.float64),
         ("to_upper", np.float64),
         ("change", np.float64),
+        ("fastest", np.float64),
+        ("accelerates", np.float64),
+        ("decelerates", np.float64),
+        ("jerk", np.float64),
     ]
 )
 """Record of a joint's reference, in rad and s. lower, upper: ends of its range. windup: as for `JointReference`;
 yields: its yield_rad. to_lower, to_upper: velocities from
-which the joint can still stop at these ends. change: target velocity minus present velocity."""
+which the joint can still stop at these ends. change: target velocity minus present velocity. fastest, accelerates,
+decelerates, jerk: its limits; decelerates after a command has expired."""
 
-_Limit = Annotated[float, Meta(gt=0.0)]
-
-
-@dataclass(frozen=True)
-class MotionLimits:
-    """Limits of each joint in the arm's own controller, for any command; in metres for a prismatic joint."""
-
-    velocity_rad_s: _Limit = 2.0
-    """Largest velocity, below the 3.14 rad/s of a UR5e and the 2.17 rad/s of a Franka arm's large joints
-    (data sheets)"""
-    acceleration_rad_s2: _Limit = 8.0
-    deceleration_rad_s2: _Limit = 12.0
-    """Deceleration of the reference after a command has expired."""
-    windup_rad: _Limit = 0.005
-    """Largest lead of the reference over a blocked joint, unless the caller allows more for weak drives. With it the
-    built-in arm's large joints press with 20 N m, about 30 N at the tool, and hardly spring when the obstacle gives
-    way."""
-
-    def __post_init__(self) -> None:
-        check_limits(self)
-
-    def of_joints(
-        self,
-        count: int,
-        lower_rad: FloatArray | None = None,
-        upper_rad: FloatArray | None = None,
-        slides: BoolArray | bool = False,
-    ) -> JointLimits:
-        """Return these limits for `count` joints (n); the other arguments are as in `JointLimits`."""
-        velocity, acceleration = np.full(count, self.velocity_rad_s), np.full(count, self.acceleration_rad_s2)
-        return JointLimits(velocity, acceleration, lower_rad, upper_rad, slides)
+WINDUP_RAD: Final = 0.005
+"""Largest lead of the reference over a blocked joint, unless weak drives need more. With it the built-in arm's large
+joints press with 20 N m, about 30 N at the tool, and hardly spring when the obstacle gives way."""
 
 
 class JointReference:
@@ -74,13 +49,13 @@ class JointReference:
         position_rad: FloatArray,
         lower_rad: FloatArray,
         upper_rad: FloatArray,
-        limits: MotionLimits,
-        windup_rad: FloatArray | None = None,
+        limits: JointLimits,
+        windup_rad: FloatArray | float = WINDUP_RAD,
         yield_rad: FloatArray | None = None,
     ) -> None:
         """Begin at `position_rad` (n,), between the ends lower_rad and upper_rad (n,), which may be infinite.
 
-        windup_rad (n,): largest lead of each joint; None: the value of `limits` for all. yield_rad (n,): deviation
+        windup_rad (n,): largest lead of each joint. yield_rad (n,): deviation
         beyond which a joint that is pushed away takes its reference along, as it would spring back; None: never.
         """
         self.joints: np.ndarray = np.zeros(position_rad.shape, REFERENCE)
@@ -89,11 +64,17 @@ class JointReference:
             ("position", np.clip(position_rad, lower_rad, upper_rad)),
             ("lower", lower_rad),
             ("upper", upper_rad),
-            ("windup", limits.windup_rad if windup_rad is None else windup_rad),
+            ("windup", windup_rad),
             ("yields", np.inf if yield_rad is None else yield_rad),
+            ("fastest", limits.velocity_rad_s),
+            ("accelerates", limits.acceleration_rad_s2),
+            ("decelerates", limits.deceleration_rad_s2),
+            ("jerk", limits.jerk_rad_s3),
         ):
             self.joints[name] = values
-        self.limits = limits
+        self._latency_s = limits.latency_s
+        self._arrived: list[tuple[FloatArray, float]] = []
+        self._late: deque[tuple[float, FloatArray, float]] = deque()
         self._valid_until_s = -math.inf
         self._following = False
 
@@ -106,18 +87,29 @@ class JointReference:
             raise ValueError(f"joint_velocity_rad_s has the shape {velocity_rad_s.shape}; valid: {self.joints.shape}")
         if not math.isfinite(valid_until_s):
             raise ValueError(f"valid_until_s = {valid_until_s}; valid: a finite time")
-        largest = float(np.abs(velocity_rad_s).max(initial=0.0))
-        if not math.isfinite(largest):
+        share = float((np.abs(velocity_rad_s) / self.joints["fastest"]).max(initial=0.0))
+        if not math.isfinite(share):
             raise ValueError("joint_velocity_rad_s holds NaN or infinity; valid: finite numbers")
-        self.joints["command"] = velocity_rad_s / max(largest / self.limits.velocity_rad_s, 1.0)
-        self._valid_until_s = valid_until_s
+        velocity_rad_s = velocity_rad_s / max(share, 1.0)
+        if self._latency_s > 0.0:
+            self._arrived.append((velocity_rad_s, valid_until_s))
+            return
+        self.joints["command"], self._valid_until_s = velocity_rad_s, valid_until_s
 
     def expire(self) -> None:
         """Forget the command; the next step is not its end."""
         self._valid_until_s, self._following = -math.inf, False
+        self._arrived.clear()
+        self._late.clear()
 
     def follows(self, time_s: float) -> tuple[bool, bool]:
         """Return whether there is a command to follow at `time_s`, and whether it has expired since the last call."""
+        if self._latency_s > 0.0:  # all that the drive is told takes effect later, the end too
+            self._late += [(time_s + self._latency_s, *one) for one in self._arrived]
+            self._arrived.clear()
+            while self._late and self._late[0][0] <= time_s:
+                _, self.joints["command"], until_s = self._late.popleft()
+                self._valid_until_s = until_s + self._latency_s
         before, self._following = self._following, time_s < self._valid_until_s
         return self._following, before and not self._following
 
@@ -128,33 +120,36 @@ def advance_references(
     following: bool,
     ended: bool,
     step_s: float,
-    fastest: float,
-    acceleration: float,
-    deceleration: float,
 ) -> None:
     """Advance the references of all `joints` by `step_s`; they stay near the measured positions.
 
-    All changes of velocity are scaled by the same factor, so that the largest is within the limit. ended: whether the
-    command has just expired.
+    All changes of velocity are scaled by the same factor, so that each is within its limit. ended: whether the command
+    has just expired.
     """
-    largest = 0.0
+    share = 1.0
     for j in range(joints.size):
         joint = joints[j]
         if ended:
             # A stop from a reference that leads would first let the arm catch up with it.
             joint.position = joint.measured_position
-            joint.velocity = min(max(joint.measured_velocity, -fastest), fastest)
+            joint.velocity = min(max(joint.measured_velocity, -joint.fastest), joint.fastest)
         # Near an end, limit the speed so that the joint can still stop before it.
-        joint.to_lower = -math.sqrt(2.0 * deceleration * max(joint.position - joint.lower, 0.0))
-        joint.to_upper = math.sqrt(2.0 * deceleration * max(joint.upper - joint.position, 0.0))
+        joint.to_lower = -math.sqrt(2.0 * joint.decelerates * max(joint.position - joint.lower, 0.0))
+        joint.to_upper = math.sqrt(2.0 * joint.decelerates * max(joint.upper - joint.position, 0.0))
         target = min(max(joint.command, joint.to_lower), joint.to_upper) if following else 0.0
         joint.change = target - joint.velocity
-        largest = max(largest, abs(joint.change))
-    most = (acceleration if following else deceleration) * step_s
-    share = most / largest if largest > most else 1.0
+        most = (joint.accelerates if following else joint.decelerates) * step_s
+        if abs(joint.change) > most:
+            share = min(share, most / abs(joint.change))
     for j in range(joints.size):
         joint = joints[j]
-        velocity = min(max(joint.velocity + joint.change * share, joint.to_lower), joint.to_upper)
+        changed = joint.change * share
+        if joint.jerk < math.inf:
+            # The fastest way to a velocity ends at it with no acceleration left: a² = 2 j |Δv| from there on.
+            most = math.sqrt(2.0 * joint.jerk * abs(joint.change)) * step_s
+            before, step = joint.acceleration * step_s, joint.jerk * step_s * step_s
+            changed = min(max(min(max(changed, -most), most), before - step), before + step)
+        velocity = min(max(joint.velocity + changed, joint.to_lower), joint.to_upper)
         joint.acceleration = (velocity - joint.velocity) / step_s
         joint.velocity = velocity
         way = velocity * step_s

@@ -22,8 +22,6 @@ from robot_side.drivers.mujoco.joint_reference import REFERENCE, advance_referen
 INERTIA: Final = np.dtype([("place", np.int64), ("row", np.int64), ("column", np.int64)])
 """Record of an element of the arm's inertia matrix, on or below the diagonal: its index in MuJoCo's sparse array, and
 its row and column as numbers of joints"""
-LIMITS: Final = np.dtype([("velocity", np.float64), ("acceleration", np.float64), ("deceleration", np.float64)])
-"""Record of each joint's limits in the arm's own controller, in rad and s"""
 
 
 class Plant(NamedTuple):
@@ -64,8 +62,6 @@ class Plant(NamedTuple):
     length_speeds: FloatArray
     ctrl: FloatArray
     """(nu,) inputs of the actuators"""
-    limits: np.ndarray
-    """(1,) record of LIMITS"""
 
 
 def inertia_table(model: Any, velocities: IntArray) -> np.ndarray:
@@ -86,7 +82,6 @@ PLANT: Final = Declared(
     records(GRIPPER_INPUT),
     *(INDICES,) * 3,
     *(NUMBERS,) * 9,
-    records(LIMITS),
 )
 _plant_at = PLANT.at
 
@@ -98,11 +93,11 @@ def drive(bundle: IntArray, following: bool, ended: bool, closing: float, step_s
     following, ended: from `JointReference.follows`. closing: from `GripperDrive.commanded_at`.
     """
     plant = _plant_at(bundle)
-    joints, drives, inertia, limits = plant.joints, plant.drives, plant.inertia, plant.limits[0]
+    joints, drives, inertia = plant.joints, plant.drives, plant.inertia
     for j in range(joints.size):
         joints[j].measured_position = plant.qpos[plant.positions[j]]
         joints[j].measured_velocity = plant.qvel[plant.velocities[j]]
-    advance_references(joints, following, ended, step_s, limits.velocity, limits.acceleration, limits.deceleration)
+    advance_references(joints, following, ended, step_s)
     for j in range(joints.size):
         joint, drive, place = joints[j], drives[j], plant.velocities[j]
         position_error = joint.position - joint.measured_position

@@ -6,6 +6,7 @@ from typing import Any, Final
 from common.roles import Role
 from common.sockets.door.client import Door
 from common.sockets.door.messages import DriverSettings
+from robot_side.arm.limits import ArmLimits
 from robot_side.arm.port import ArmState
 from robot_side.drivers.remote.arm import RemoteArm
 from robot_side.drivers.remote.driver_session import ArmShape
@@ -73,6 +74,15 @@ class ConnectedDrivers:
                     self._note(f"waiting for {_AWAITED[flag]} at {self._ports[flag].endpoint}")
             meanwhile()
             self._ports[waiting[0]].wait(_TURN_S)
+
+    def said_limits(self) -> ArmLimits | None:
+        """Return the limits that the arm's driver has said of its arm; None without any."""
+        return None if self._arm is None else self._arm.session.said_limits
+
+    def limits_taken(self) -> None:
+        """Judge the arm's states by its limits as they are now."""
+        if self._arm is not None:
+            self._arm.session.read_limits()
 
     def summary(self) -> dict[str, Any]:
         """Return the numbers of accepted and rejected messages of each port; None for a port that is not used."""

@@ -8,12 +8,12 @@ from typing import Final, Literal, NamedTuple
 import msgspec
 
 from common.arrays import FloatArray
+from common.command.words import printable
 from common.errors import OtherVersionError, RemoteProtocolError
 from common.periods import EARLY
-from common.timing.clock_offset import MAX_SKEW, ROUNDING
-from common.timing.offset_interval import OffsetInterval
-from robot_side.arm.ability import JointLimits
+from robot_side.arm.limits import ArmLimits, JointLimits
 from robot_side.arm.port import ArmState
+from robot_side.drivers.remote.driver_clock import DriverClock
 from robot_side.drivers.remote.messages import (
     DRIVER_VERSION,
     DriverCommand,
@@ -24,45 +24,6 @@ from robot_side.drivers.remote.messages import (
     floats,
 )
 from robot_side.drivers.remote.plausibility import Plausibility
-
-
-class DriverClock:
-    """Bounds of the driver's clock minus ours, computed from stamps.
-
-    A message is sent before it arrives, and read before its echo is sent. With these bounds a state never counts as
-    younger than it can be, and a time to stop is never too late.
-    """
-
-    def __init__(self) -> None:
-        self._interval = OffsetInterval(MAX_SKEW)
-        self._at_s = 0.0
-
-    def update(self, sent_s: float, received_s: float, echoed: tuple[float, float] | None) -> bool:
-        """Take a message's stamps; False if they contradict earlier stamps, because a clock jumped or a stamp is false.
-
-        echoed: our stamp that the message echoes, and the time for which the driver held it.
-        """
-        self._at_s, margin_s = max(self._at_s, received_s), ROUNDING * (abs(sent_s) + abs(received_s))
-        self._interval.advance(received_s)
-        possible = self._interval.bound_below(sent_s - received_s, margin_s)
-        if echoed is not None and possible:
-            echo_s, held_s = echoed
-            possible = self._interval.bound_above(sent_s - held_s - echo_s, echo_s, margin_s)
-        return possible
-
-    @property
-    def known(self) -> bool:
-        """Whether both bounds of the clock's offset are known"""
-        return self._interval.bounded
-
-    def ours_s(self, driver_s: float) -> float:
-        """Return the earliest possible time of `driver_s` on our clock; minus infinity before the first echo."""
-        return driver_s - self._interval.at(self._at_s)[1]
-
-    def drivers_s(self, our_s: float) -> float:
-        """Return the earliest possible time of `our_s` on the driver's clock."""
-        return our_s + self._interval.at(self._at_s)[0]
-
 
 SILENT_S: Final = 0.1
 """Silence, in seconds, after which a driver is lost"""
@@ -80,6 +41,11 @@ _DECODER: Final = msgspec.msgpack.Decoder(DriverState)
 _UNANSWERED: Final = 250
 """Number of commands without an echo, as many as in a second, after which the driver counts as not echoing"""
 
+_CONDITIONS: Final = {
+    "protective_stop": "a protective stop",
+    "fault": "a fault",
+    "emergency_stop": "an emergency stop",
+}
 Why = Literal["second", "version", "malformed", "joints", "order", "echo", "clock", "impossible"]
 
 
@@ -113,6 +79,7 @@ class DriverSession:
         self.rejected: Counter[Why] = Counter()
         """Number of rejected states by reason; a state is rejected as a whole."""
         self.accepted = 0
+        self._said_limits: ArmLimits | None = None
         self._shape = shape
         self._peer: bytes | None = None
         self._last_peer: bytes | None = None
@@ -133,6 +100,15 @@ class DriverSession:
         self._told_present, self._told_s = False, -math.inf
         self._said: set[Why] = set()
         self._notes: list[str] = []
+
+    @property
+    def said_limits(self) -> ArmLimits | None:
+        """Limits that the first state said; None if it said none"""
+        return self._said_limits
+
+    def read_limits(self) -> None:
+        """Judge states by the shape's limits as they are now."""
+        self._plausibility.read_limits()
 
     @property
     def driver(self) -> bytes | None:
@@ -230,6 +206,9 @@ class DriverSession:
                 raise ValueError(
                     f"{name} holds {len(values)} values; valid: {len(names)} ({', '.join(names) or 'none'})"
                 )
+        for name, limits in () if said.limits is None else msgspec.structs.asdict(said.limits).items():
+            if isinstance(limits, tuple) and len(limits) != len(self._shape.joint_names):
+                raise ValueError(f"limits.{name} holds {len(limits)} values; valid: {len(self._shape.joint_names)}")
         if said.measured_s > said.sent_s:
             raise RemoteProtocolError(f"measured_s = {said.measured_s}; valid: up to sent_s = {said.sent_s}")
 
@@ -258,6 +237,8 @@ class DriverSession:
             why = "the driver's clock jumped, or echo_s and held_s are not from our commands"
             self._reject("clock", why, peer, received_s)
             return
+        if self.accepted == 0 and said.limits is not None:
+            self._said_limits = ArmLimits(**msgspec.structs.asdict(said.limits))
         positions, velocities = floats(said.joint_positions), floats(said.joint_velocities)
         if (fault := self._plausibility.fault(said.measured_s, positions, velocities)) is not None:
             self._doubt_states(f"the driver's states cannot be true: {fault}", received_s)
@@ -282,6 +263,7 @@ class DriverSession:
             gripper_holding=said.holding,
             joint_loads_nm=None if said.joint_loads is None else floats(said.joint_loads),
             doubt=self._doubt,
+            condition=_condition(said),
         )
 
     def _begin(self, sequence: int) -> None:
@@ -305,3 +287,11 @@ class DriverSession:
         if now_s - self._refused_s >= _REFUSAL_PERIOD_S:
             self._refused_s = now_s
             self._outgoing.append((peer, encode(Refusal(DRIVER_VERSION, text))))
+
+
+def _condition(said: DriverState) -> str | None:
+    """Return why the arm's own controller lets nothing move, in words; None if it is ready."""
+    if said.condition == "ready":
+        return None
+    words = f"the arm is in {_CONDITIONS[said.condition]}"
+    return f"{words}: {printable(said.condition_text)}" if said.condition_text else words

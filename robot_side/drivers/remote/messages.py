@@ -1,6 +1,6 @@
 """Messages between an arm's driver and the robot side (docs/drivers.md): maps in MessagePack."""
 
-from typing import Annotated, Any, Final, TypeVar
+from typing import Annotated, Any, Final, Literal, TypeVar
 
 import msgspec
 import numpy as np
@@ -22,6 +22,21 @@ _Opening = Annotated[float, Meta(ge=0.0, le=1.0)]
 _Value = Annotated[float, Meta(ge=-1e6, le=1e6)]
 _Values = Annotated[tuple[_Value, ...], Meta(max_length=MOST_JOINTS)]
 Message = TypeVar("Message", bound=Struct)
+
+
+_Limits = Annotated[tuple[Annotated[float, Meta(gt=0.0, le=1e6)], ...], Meta(max_length=MOST_JOINTS)]
+Condition = Literal["ready", "protective_stop", "fault", "emergency_stop"]
+
+
+class SaidLimits(Struct, frozen=True, forbid_unknown_fields=True):
+    """Limits that a driver says of its arm, (n,) each; as in `ArmLimits`."""
+
+    velocity_rad_s: _Limits | None = None
+    acceleration_rad_s2: _Limits | None = None
+    deceleration_rad_s2: _Limits | None = None
+    jerk_rad_s3: _Limits | None = None
+    latency_s: Annotated[float, Meta(ge=0.0, le=1.0)] | None = None
+    load_nm: _Limits | None = None
 
 
 class DriverState(Struct, frozen=True, forbid_unknown_fields=True):
@@ -47,6 +62,12 @@ class DriverState(Struct, frozen=True, forbid_unknown_fields=True):
     holding: bool = False
     joint_loads: _Values | None = None
     """(n,) torques in N m, or forces in N, from the carried load"""
+    condition: Condition = "ready"
+    """Whether the arm's own controller lets it move, and if not, why"""
+    condition_text: Annotated[str, Meta(max_length=200)] = ""
+    """The arm's own words for its condition"""
+    limits: SaidLimits | None = None
+    """Limits of the arm; those of the driver's first state count"""
 
 
 class DriverCommand(Struct, frozen=True):

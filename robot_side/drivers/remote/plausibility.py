@@ -11,8 +11,8 @@ from typing import Final
 import numpy as np
 
 from common.arrays import BoolArray, FloatArray
-from robot_side.arm.ability import JointLimits
 from robot_side.arm.commanded import LEVER_M
+from robot_side.arm.limits import JointLimits
 
 FASTER: Final = 2.0
 """Multiple of a joint's greatest velocity up to which it is believed, as reported and as moved"""
@@ -46,12 +46,18 @@ class Plausibility:
         self._names = [f"joint {j + 1} ({name[:40]})" for j, name in enumerate(names)]
         self._units = ["m" if one else "rad" for one in slides]
         self._turns = np.where(~slides & (upper_rad - lower_rad >= _TURN_RAD), 2.0 * math.pi, math.inf)
-        self._fastest = FASTER * limits.velocity_rad_s
+        self._limits = limits
         self._step = STEP_RAD * scale + 6.0 * sigma_rad
-        self._apart = LAG_S * self._fastest + self._step
-        self._creep, self._change = _CREEP_RAD_S * scale, 0.5 * limits.acceleration_rad_s2
+        self._creep = _CREEP_RAD_S * scale
         self._count = count
+        self.read_limits()
         self.restart()
+
+    def read_limits(self) -> None:
+        """Judge by the limits as they are now."""
+        self._fastest = FASTER * self._limits.velocity_rad_s
+        self._apart = LAG_S * self._fastest + self._step
+        self._change = 0.5 * self._limits.acceleration_rad_s2
 
     def restart(self) -> None:
         """Begin anew at the next state, which may be anywhere."""

@@ -15,13 +15,13 @@ from feelahead.lab.questions import error as module
 from feelahead.lab.questions.error import QUESTION
 from feelahead.lab.sweep import ask
 from feelahead.lab.table import Row, Table
+from robot_side.arm.limits import ACCELERATION_RAD_S2, ArmLimits
 from robot_side.arm.port import GripperPose
-from robot_side.drivers.mujoco.joint_reference import MotionLimits
 from robot_side.drivers.mujoco.scene import load_scene
 from robot_side.enlargement.prediction_errors import load_prediction_errors
 
 FULL_M_S = 0.25
-LIMITS = MotionLimits()
+LIMITS = ArmLimits()
 TICK_S = 0.001
 BEGAN_S, END_S = 2.0, 6.0
 
@@ -56,7 +56,7 @@ def recorded(travels: FloatArray, there_ms: int, back_ms: int, quantile_s: float
         onsets_m.append(way_m)
         speeds.append(speed)
         target = FULL_M_S * travels[index] if index >= 0 else 0.0
-        most = LIMITS.acceleration_rad_s2 * TICK_S
+        most = ACCELERATION_RAD_S2 * TICK_S
         after = speed + min(max(target - speed, -most), most)
         way_m += 0.5 * (speed + after) * TICK_S
         speed = after

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from common.arrays import FloatArray
-from robot_side.arm.ability import JointLimits
+from robot_side.arm.limits import JointLimits
 from robot_side.arm.port import GripperPose
 from robot_side.arm.tool_motion import ToolMotionSettings
 from robot_side.enlargement.distance import Uncertainty

@@ -7,16 +7,16 @@ from hypothesis import strategies as st
 from common.following import follow_together
 from common.protocol.messages import Header, MotionCommand
 from robot_side.arm.ability import change_times_s
+from robot_side.arm.limits import ACCELERATION_RAD_S2, ArmLimits
 from robot_side.arm.resolved_rate import joint_velocities
 from robot_side.arm.tool_motion import ToolMotionSettings, full_twists, tool_motion
 from robot_side.drivers.mujoco.arm import MujocoArm
 from robot_side.drivers.mujoco.encoders import Encoder
-from robot_side.drivers.mujoco.joint_reference import MotionLimits
 from robot_side.drivers.mujoco.kinematics import MujocoKinematics
 from robot_side.drivers.mujoco.scene import load_scene
 
 STEP_S = 0.001
-MOTION, LIMITS = ToolMotionSettings(), MotionLimits(velocity_rad_s=100.0)
+MOTION, LIMITS = ToolMotionSettings(), ArmLimits(velocity_rad_s=100.0)
 SCENE = load_scene(None)
 POSE = MujocoKinematics(SCENE).pose(MujocoArm(SCENE, Encoder(seed=1)).state(0.0))
 asked = st.lists(st.floats(-1.0, 1.0), min_size=5, max_size=5)
@@ -45,7 +45,7 @@ def test_trigger_and_sticks_are_followed_as_the_joints_references_follow_them(
     velocity, target, passed = rates(began), rates(then), np.zeros(joints)
     for _ in range(60):
         change = target - velocity
-        share = min(1.0, LIMITS.acceleration_rad_s2 * STEP_S / max(float(np.abs(change).max()), 1e-12))
+        share = min(1.0, ACCELERATION_RAD_S2 * STEP_S / max(float(np.abs(change).max()), 1e-12))
         passed += STEP_S * (velocity + 0.5 * share * change)
         velocity = velocity + share * change
     gained, followed = follow_together(np.array(began), np.array(then), changes_s, 60 * STEP_S)

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from common.arrays import FloatArray
-from robot_side.arm.ability import JointLimits
 from robot_side.arm.following import Following
+from robot_side.arm.limits import JointLimits
 from robot_side.arm.port import ArmState
 
 TICK_S = 0.004

@@ -13,13 +13,13 @@ from hypothesis.extra import numpy as hnp
 
 from common.arrays import FloatArray
 from common.protocol.messages import Header, MotionCommand
-from robot_side.arm.ability import JointLimits, ability
+from robot_side.arm.ability import ability
 from robot_side.arm.commanded import commanded
 from robot_side.arm.hindrance import Cause, Hindrance
+from robot_side.arm.limits import ArmLimits, JointLimits
 from robot_side.arm.port import GripperPose
 from robot_side.arm.resolved_rate import joint_velocities
 from robot_side.arm.tool_motion import ToolMotionSettings, tool_motion
-from robot_side.drivers.mujoco.joint_reference import MotionLimits
 from tests.helpers.gripper_poses import free_pose
 from tests.helpers.perceived_scenes import random_rotation
 from tests.helpers.tool_driver import PERIOD_S, ToolDriver
@@ -156,7 +156,7 @@ def test_the_simulated_arm_gives_that_speed_and_no_less_acceleration(direction: 
     driver = ToolDriver.load()
     pose = driver.pose(driver.wait(PERIOD_S))
     along = pose.tool_rotation @ np.array(direction)
-    able = ability(pose, MotionLimits().of_joints(driver.arm.joint_count), along, 0.25)
+    able = ability(pose, ArmLimits().of_joints(driver.arm.joint_count), along, 0.25)
     assert able.within_reach
     assert able.full_speed_m_s == pytest.approx(0.25)
     twist = np.concatenate([0.25 * along, np.zeros(3)])

@@ -8,7 +8,7 @@ import pytest
 
 from common.protocol.around import PROBES
 from common.skipped import Part, shares
-from robot_side.arm.ability import JointLimits
+from robot_side.arm.limits import JointLimits
 from robot_side.laws import looking
 from robot_side.laws.gripper_motion import gripper_motion
 from robot_side.laws.swept import SweptLaw

@@ -13,7 +13,8 @@ import pytest
 
 from common.protocol.codec import encode
 from common.protocol.link_end import Arrival
-from robot_side.drivers.mujoco.joint_reference import JointReference, MotionLimits
+from robot_side.arm.limits import DECELERATION_RAD_S2
+from robot_side.drivers.mujoco.joint_reference import JointReference
 from robot_side.operators.safety import Permission, Safety
 from tests.robot_side.session_bench import COMMAND_PERIOD_TICKS, CRUISE, QUICK, TICK_S, Bench, Operator
 
@@ -35,7 +36,7 @@ def begins_to_slow_s(bench: Bench, before: int) -> float:
     later = bench.watch.speeds_rad_s[before:]
     measured_s, speed = next(one for one in later if one[1] < 0.95 * even)
     # By now the arm has slowed down for a while, at a known rate.
-    return measured_s - (even - speed) / MotionLimits().deceleration_rad_s2
+    return measured_s - (even - speed) / DECELERATION_RAD_S2
 
 
 def stream_stops() -> None:

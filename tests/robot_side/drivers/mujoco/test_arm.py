@@ -5,11 +5,11 @@ import numpy as np
 import pytest
 
 from common.errors import FeelaheadError
+from robot_side.arm.limits import ArmLimits
 from robot_side.drivers.mujoco.arm import LONGEST_TURN_S, MujocoArm
 from robot_side.drivers.mujoco.drives.joint_drives import JointDrives
 from robot_side.drivers.mujoco.encoders import Encoder
 from robot_side.drivers.mujoco.ground_truth import GroundTruth
-from robot_side.drivers.mujoco.joint_reference import MotionLimits
 from robot_side.drivers.mujoco.scene import Scene, load_scene
 from tests.helpers.arm_models import (
     COUPLING,
@@ -22,8 +22,9 @@ from tests.helpers.arm_models import (
 from tests.helpers.tool_driver import PERIOD_S, VALID_S, ToolDriver
 
 
-def perfect_arm(scene: Scene, limits: MotionLimits | None = None) -> MujocoArm:
-    return MujocoArm(scene, Encoder(0.0, 0.0), limits)
+def perfect_arm(scene: Scene, limits: ArmLimits | None = None) -> MujocoArm:
+    joints = len(scene.robot.arm_joints)
+    return MujocoArm(scene, Encoder(0.0, 0.0), None if limits is None else limits.of_joints(joints))
 
 
 @pytest.mark.parametrize(

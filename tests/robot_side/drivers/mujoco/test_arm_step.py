@@ -8,14 +8,21 @@ import numpy as np
 import pytest
 
 from common.arrays import FloatArray
+from robot_side.arm.limits import JointLimits
 from robot_side.drivers.mujoco.arm import MujocoArm
 from robot_side.drivers.mujoco.encoders import Encoder
 from robot_side.drivers.mujoco.gripper_measurement import GripperTravel, measure_gripper
-from robot_side.drivers.mujoco.joint_reference import MotionLimits
 from robot_side.drivers.mujoco.scene import Scene, load_scene
 from tests.helpers.arm_models import MIRRORED_GRIPPER, MOTORS, POSITION_SERVOS, SEVERAL, VELOCITY_SERVOS, planar_arm
 
-LIMITS = MotionLimits(velocity_rad_s=1.0, windup_rad=0.01)
+WINDUP_RAD = 0.01
+# Each joint has limits of its own; those with a limited jerk have a test of theirs.
+UNEQUAL = JointLimits(
+    np.array([1.0, 0.8, 1.2, 1.0, 0.9, 1.1]),
+    np.array([8.0, 6.0, 9.0, 8.0, 7.0, 5.0]),
+    deceleration_rad_s2=np.array([12.0, 11.0, 12.0, 14.0, 12.0, 10.0]),
+    jerk_rad_s3=np.full(6, np.inf),
+)
 STEPS = 3000
 SPRING = '<joint name="elbow" stiffness="3" springref="-40"'
 
@@ -25,23 +32,24 @@ class PlainReference:
         self, position: FloatArray, ends: tuple[FloatArray, FloatArray], windup: FloatArray, yields: FloatArray
     ) -> None:
         self.position, (self.lower, self.upper), self.windup, self.yields = position, ends, windup, yields
+        self.limits = first_of(UNEQUAL, len(position))
         self.velocity, self.acceleration, self.command = (np.zeros_like(position) for _ in range(3))
         self.followed = False
 
     def told(self, velocity: FloatArray) -> None:
-        self.command = velocity / max(np.abs(velocity).max() / LIMITS.velocity_rad_s, 1.0)
+        self.command = velocity / max((np.abs(velocity) / self.limits.velocity_rad_s).max(), 1.0)
 
     def advance(self, following: bool, step_s: float, measured: FloatArray, measured_speed: FloatArray) -> None:
         if self.followed and not following:
             self.position = measured
-            self.velocity = np.clip(measured_speed, -LIMITS.velocity_rad_s, LIMITS.velocity_rad_s)
+            self.velocity = np.clip(measured_speed, -self.limits.velocity_rad_s, self.limits.velocity_rad_s)
         self.followed = following
-        stopping = 2.0 * LIMITS.deceleration_rad_s2
+        stopping = 2.0 * self.limits.deceleration_rad_s2
         slowest = -np.sqrt(stopping * np.maximum(self.position - self.lower, 0.0))
         fastest = np.sqrt(stopping * np.maximum(self.upper - self.position, 0.0))
         change = (np.clip(self.command, slowest, fastest) if following else 0.0) - self.velocity
-        most = (LIMITS.acceleration_rad_s2 if following else LIMITS.deceleration_rad_s2) * step_s
-        change = change * min(most / max(np.abs(change).max(), 1e-300), 1.0)
+        most = (self.limits.acceleration_rad_s2 if following else self.limits.deceleration_rad_s2) * step_s
+        change = change * min((most / np.maximum(np.abs(change), 1e-300)).min(), 1.0)
         velocity = np.clip(self.velocity + change, slowest, fastest)
         self.acceleration, self.velocity = (velocity - self.velocity) / step_s, velocity
         lead = self.windup + np.abs(velocity * step_s)
@@ -50,8 +58,13 @@ class PlainReference:
             np.minimum(self.position, measured - lead),
             np.maximum(self.position, measured + lead),
         )
-        most = np.maximum(self.yields, lead)
-        self.position = np.clip(near, measured - most, measured + most)
+        farthest = np.maximum(self.yields, lead)
+        self.position = np.clip(near, measured - farthest, measured + farthest)
+
+
+def first_of(limits: JointLimits, count: int) -> JointLimits:
+    names = ("velocity_rad_s", "acceleration_rad_s2", "deceleration_rad_s2", "jerk_rad_s3")
+    return JointLimits(**{name: getattr(limits, name)[:count] for name in names})
 
 
 class PlainGripper:
@@ -139,11 +152,12 @@ def test_every_step_is_what_plain_formulas_say(tmp_path: Path, load: Callable[[P
     scene = load(tmp_path)
     data, robot = scene.data, scene.robot
     travel = measure_gripper(scene)
-    arm = MujocoArm(scene, Encoder(0.0, 0.0), LIMITS)
+    limits = first_of(UNEQUAL, len(scene.robot.arm_joints))
+    arm = MujocoArm(scene, Encoder(0.0, 0.0), limits, windup_rad=WINDUP_RAD)
     step_s, joints = scene.model.opt.timestep, arm.joint_count
     gripper = None if travel is None else PlainGripper(travel)
     start = data.qpos[robot.arm_positions]
-    windup_rad = robot.drives.windup_rad(LIMITS.windup_rad)
+    windup_rad = robot.drives.windup_rad(WINDUP_RAD)
     reference = PlainReference(start, arm.ends_rad, windup_rad, robot.drives.yield_rad())
     random = np.random.default_rng(1)
     arm.state(0.0)
@@ -165,11 +179,11 @@ def test_every_step_is_what_plain_formulas_say(tmp_path: Path, load: Callable[[P
         before, was_there = reference.velocity, data.qpos[robot.arm_positions].copy()
         reference.advance(now_s < ends_s, step_s, was_there, data.qvel[robot.arm_velocities])
         # No limit is broken, and the only jump is to the measurement when a command ends.
-        assert (np.abs(reference.velocity) <= LIMITS.velocity_rad_s + 1e-12).all()
+        assert (np.abs(reference.velocity) <= limits.velocity_rad_s + 1e-12).all()
         assert (np.abs(reference.position - was_there) <= windup_rad + np.abs(reference.velocity * step_s) + 1e-9).all()
         assert ((arm.ends_rad[0] <= reference.position) & (reference.position <= arm.ends_rad[1])).all()
         if now_s < ends_s:
-            assert np.abs(reference.velocity - before).max() <= LIMITS.deceleration_rad_s2 * step_s + 1e-12
+            assert (np.abs(reference.velocity - before) <= limits.deceleration_rad_s2 * step_s + 1e-12).all()
         control, torque = plain_inputs(scene, reference)
         if gripper is not None:
             of = robot.gripper_actuators

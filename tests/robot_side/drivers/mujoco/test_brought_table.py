@@ -6,6 +6,7 @@ import mujoco  # type: ignore[import-untyped]
 import numpy as np
 import pytest
 
+from robot_side.arm.limits import ArmLimits
 from robot_side.drivers.mujoco.arm import MujocoArm
 from robot_side.drivers.mujoco.brought.table import fit_target
 from robot_side.drivers.mujoco.checks.cost import cost_findings
@@ -15,7 +16,6 @@ from robot_side.drivers.mujoco.checks.reach import reach_findings
 from robot_side.drivers.mujoco.checks.site_axis import site_findings
 from robot_side.drivers.mujoco.encoders import Encoder
 from robot_side.drivers.mujoco.gripper_measurement import measure_gripper
-from robot_side.drivers.mujoco.joint_reference import MotionLimits
 from robot_side.drivers.mujoco.robot_model import SiteAxis
 from robot_side.drivers.mujoco.scene import Scene, load_scene
 from tests.helpers.arm_models import TENDON_GRIPPER, planar_arm
@@ -185,7 +185,7 @@ def test_joints_that_do_not_follow_when_they_are_tried_are_named(
     scene = load_scene(brought(tmp_path, (old, new)), "tool")
     arm = MujocoArm(scene, Encoder(0.0, 0.0))
     before = scene.data.qpos.copy(), scene.data.ctrl.copy()
-    lines = following_findings(scene, arm, MotionLimits())
+    lines = following_findings(scene, arm, ArmLimits().of_joints(arm.joint_count, *arm.ends_rad))
     assert [line.partition(": ")[2] for line in lines] == [said] * (said is not None)
     assert arm.state(5.0).simulated_s == scene.data.time == 0.0
     assert not scene.data.qvel.any()

@@ -9,7 +9,7 @@ from typing import Any
 import msgpack
 import numpy as np
 
-from robot_side.arm.ability import JointLimits
+from robot_side.arm.limits import JointLimits
 from robot_side.arm.port import ArmState
 from robot_side.drivers.remote.arm import RemoteArm
 from robot_side.drivers.remote.driver_session import ArmShape

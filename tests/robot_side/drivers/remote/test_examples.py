@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from common.sockets.driver_port import DriverPort
-from robot_side.drivers.mujoco.joint_reference import MotionLimits
+from robot_side.arm.limits import ArmLimits
 from robot_side.drivers.mujoco.scene import Scene
 from robot_side.drivers.remote.arm import RemoteArm
 from robot_side.drivers.remote.driver_session import ArmShape
@@ -49,7 +49,7 @@ def port() -> Iterator[DriverPort]:
 
 @pytest.fixture
 def arm(port: DriverPort, scene: Scene) -> RemoteArm:
-    limits = MotionLimits().of_joints(6)
+    limits = ArmLimits().of_joints(6)
     shape = ArmShape(tuple(f"joint{k}" for k in range(6)), ("left", "right"), np.full(2, 0.04), 0.08, limits)
     return RemoteArm(port, shape, scene.show, lambda _: None)
 

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from common.arrays import FloatArray
-from robot_side.arm.ability import JointLimits
+from robot_side.arm.limits import JointLimits
 from robot_side.drivers.remote.plausibility import Plausibility
 from tests.robot_side.drivers.remote.driver_desk import DriverDesk
 
