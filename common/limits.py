@@ -10,7 +10,7 @@ msgspec uses the same `Meta` to decode a message or a TOML file, so that a range
 
 import functools
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from types import UnionType
 from typing import Annotated, Any, Union, get_args, get_origin, get_type_hints
 
@@ -71,8 +71,8 @@ def _check_of(hint: Any) -> _Check | None:
         metas = [meta for meta in arguments[1:] if isinstance(meta, Meta)]
         return _range_check(metas[0], arguments[0]) if metas else _check_of(arguments[0])
     if origin in (Union, UnionType):
-        checks = [check for argument in arguments if (check := _check_of(argument)) is not None]
-        return _optional_check(checks[0]) if checks and type(None) in arguments else None
+        checks = {get_origin(one) is tuple: check for one in arguments[::-1] if (check := _check_of(one)) is not None}
+        return _optional_check(checks) if checks and type(None) in arguments else None
     if origin is tuple:
         check = _check_of(arguments[0])
         return None if check is None else _elements_check(check)
@@ -103,10 +103,12 @@ def _range_check(meta: Meta, kind: type) -> _Check:
     return check_length if kind is str else check
 
 
-def _optional_check(check: _Check) -> _Check:
+def _optional_check(checks: Mapping[bool, _Check]) -> _Check:
+    """Return a check of an optional value. checks: of a tuple (True), and of a single value (False)."""
+
     def check_unless_none(name: str, value: Any) -> None:
         if value is not None:
-            check(name, value)
+            checks.get(isinstance(value, tuple), next(iter(checks.values())))(name, value)
 
     return check_unless_none
 

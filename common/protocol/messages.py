@@ -7,7 +7,7 @@
 A field out of range or not finite makes the whole message invalid: no part is applied.
 """
 
-from typing import Annotated, Final, Literal
+from typing import Annotated, Literal
 
 import msgspec
 from msgspec import Meta
@@ -15,7 +15,7 @@ from msgspec import Meta
 from common.episode import EpisodeMark
 from common.limits import Finite, Share, check_limits
 from common.protocol.around import Around
-from common.protocol.ranges import FARTHEST_M, all_in_range, both_or_neither, finite, in_range, rising
+from common.protocol.ranges import FARTHEST_M, LATEST_S, all_in_range, both_or_neither, finite, in_range, rising
 from common.protocol.session import SessionState
 
 Vector2 = tuple[float, float]
@@ -34,9 +34,7 @@ _Rate = Annotated[float, Meta(ge=0.1, le=1000.0)]
 _Far = Annotated[float, Meta(ge=0.0, le=FARTHEST_M)]
 _Place = tuple[Finite, Finite, Finite]
 _Turn = Annotated[float, Meta(ge=-4.0, le=4.0)]
-_Component = Annotated[float, Meta(ge=-1.0 - 2.0**-10, le=1.0 + 2.0**-10)]
-"""Component of a unit vector, with room for rounding."""
-
+_Component = Annotated[float, Meta(ge=-1.0 - 2.0**-10, le=1.0 + 2.0**-10)]  # of a unit vector, with room for rounding
 # Every limit is exact in single precision: a valid message stays valid on the wire.
 
 
@@ -213,15 +211,13 @@ class TriggerField(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_
     """Advances from here along the trigger at which strengths 1 to 8 begin, in ascending order, for fast zones;
     `horizon_m` for those beyond the horizon. Below 0: the gripper is past the onset."""
     slow_m: OnsetDistances
-    """Advances from here along the trigger at which strengths 1 to 8 begin, for slow zones, whose commanded speed is so
-    low that touching the target is allowed."""
+    """The same for slow zones, whose commanded speed is so low that touching the target is allowed."""
     full_speed_m_s: float
     """v_max: speed along the trigger's direction that a full pull commands in this pose."""
     acceleration_m_s2: float
     """a: acceleration along the trigger's direction that the joints are sure to reach in this pose."""
     displacement_m: float
-    """δ along the trigger, as the robot side computes it: v t_d (eq. 8); v_max t_d while the commands under way are
-    unknown."""
+    """δ along the trigger by the robot side: v t_d (eq. 8); v_max t_d while the commands under way are unknown."""
     course_stiffness: float
     """Stiffness s(δ) to which the present course along the trigger leads, by `fast_m` after the advance
     `displacement_m`, 0 to 1; not what the trigger meets now."""
@@ -233,9 +229,6 @@ class TriggerField(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_
         in_range("acceleration_m_s2", _SLOWEST, 1e6, self.acceleration_m_s2)
         in_range("displacement_m", -FARTHEST_M, FARTHEST_M, self.displacement_m)
         in_range("course_stiffness", 0.0, 1.0, self.course_stiffness)
-
-
-LONGEST_RESPONSE_S: Final = 1.02
 
 
 class StiffnessUpdate(Message, frozen=True, tag="stiffness"):
@@ -252,8 +245,8 @@ class StiffnessUpdate(Message, frozen=True, tag="stiffness"):
     state: MotionState
     """State of the arm: disarmed, armed or stopped"""
     commanded_m_s: float | None = None
-    """Commanded speed along R2's direction: what remains of the newest command after joint limits; 0 if the command was
-    discarded or stopped. None if unknown: the arm then counts as following the command."""
+    """Commanded speed along R2's direction: what remains of the newest command after joint limits; 0 if it was stopped.
+    None if unknown: the arm then counts as following the command."""
     stands: bool = False
     """Whether the held object is supported, so that it cannot move farther down."""
     hindered: bool = False
@@ -261,11 +254,11 @@ class StiffnessUpdate(Message, frozen=True, tag="stiffness"):
     around: Around | None = None
     """Onset distances around the gripper. Only a few messages have them; they hold until the next."""
     response_s: float = 0.0
-    """Time from a command's arrival at the robot side until the arm follows it; the wire holds it in steps of 4 ms."""
+    """Time from a command's arrival at the robot side until the arm follows it; in steps of 4 ms on the wire"""
 
     def __post_init__(self) -> None:
         in_range("speed_m_s", -FARTHEST_M, FARTHEST_M, self.speed_m_s)
-        in_range("response_s", 0.0, LONGEST_RESPONSE_S, self.response_s)
+        in_range("response_s", 0.0, LATEST_S, self.response_s)
         if self.commanded_m_s is not None:
             in_range("commanded_m_s", -FARTHEST_M, FARTHEST_M, self.commanded_m_s)
         in_range("horizon_m", 0.0, FARTHEST_M, self.horizon_m)

@@ -5,6 +5,8 @@ from collections.abc import Iterable
 from typing import Final
 
 FARTHEST_M: Final = 100.0
+LATEST_S: Final = 1.02
+"""Longest time in which an arm responds, in s"""
 """Largest distance in a message"""
 
 

@@ -105,7 +105,7 @@ class LateStops:
         if late_s[worst] < _LEAST_S:
             return
         # A way that grows with the square of the speed takes longer from full speed: v / 2a.
-        faster = min(float(self._limits.velocity_rad_s[worst] / abs(speed[worst])), _FASTER)
+        faster = min(float((self._limits.velocity_rad_s / np.maximum(np.abs(speed), 1e-9)).min()), _FASTER)
         later_s = min(faster * float(late_s[worst]), _MOST_S)
         if later_s > self.later_s:
             self.later_s = later_s

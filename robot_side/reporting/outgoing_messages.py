@@ -9,7 +9,8 @@ import numpy as np
 from common.arrays import FloatArray
 from common.protocol.around import Around
 from common.protocol.codec import encode
-from common.protocol.messages import LONGEST_RESPONSE_S, Header, MotionState, StiffnessUpdate, Telemetry
+from common.protocol.messages import Header, MotionState, StiffnessUpdate, Telemetry
+from common.protocol.ranges import LATEST_S
 from robot_side.arm.hindrance import Hindrance
 from robot_side.arm.port import ArmState, GripperPose
 from robot_side.arm.stick_frames import StickFrames
@@ -73,7 +74,7 @@ def stiffness_message(
         stands=stands,
         hindered=hindered,
         around=around,
-        response_s=min(response_s, LONGEST_RESPONSE_S),
+        response_s=min(response_s, LATEST_S),
     )
     return Outgoing("haptics", receiver.peer, encode(update), receiver.everywhere)
 

@@ -158,6 +158,8 @@ def is_told_as_it_was(message: StiffnessUpdate | Telemetry, back: Any) -> None:
                 assert told_m >= sent_m - STEP_M or told_m == horizon_m <= sent_m or not known
         elif name == "horizon_m":
             assert value - STEP_M <= told[name] <= value
+        elif name == "response_s":
+            assert value - 1e-6 <= told[name] <= value + 0.004
         elif name == "rumble":
             assert value <= told[name] <= value + 0.125
         elif isinstance(value, float):

@@ -8,7 +8,6 @@ from typing import Final, Literal, NamedTuple
 import msgspec
 
 from common.arrays import FloatArray
-from common.command.words import printable
 from common.errors import OtherVersionError, RemoteProtocolError
 from common.periods import EARLY
 from robot_side.arm.limits import ArmLimits, JointLimits
@@ -209,6 +208,8 @@ class DriverSession:
         for name, limits in () if said.limits is None else msgspec.structs.asdict(said.limits).items():
             if isinstance(limits, tuple) and len(limits) != len(self._shape.joint_names):
                 raise ValueError(f"limits.{name} holds {len(limits)} values; valid: {len(self._shape.joint_names)}")
+        if not said.condition_text.isprintable():
+            raise RemoteProtocolError(f"condition_text = {said.condition_text!r:.100}; valid: printable characters")
         if said.measured_s > said.sent_s:
             raise RemoteProtocolError(f"measured_s = {said.measured_s}; valid: up to sent_s = {said.sent_s}")
 
@@ -294,4 +295,4 @@ def _condition(said: DriverState) -> str | None:
     if said.condition == "ready":
         return None
     words = f"the arm is in {_CONDITIONS[said.condition]}"
-    return f"{words}: {printable(said.condition_text)}" if said.condition_text else words
+    return f"{words}: {said.condition_text}" if said.condition_text else words

@@ -90,6 +90,21 @@ def test_it_is_what_a_fine_stepping_of_time_gives(
     assert found.speed_m_s == pytest.approx(reference.speed_m_s, abs=2e-3)
 
 
+@given(COMMANDS, SPEED, ACCELERATION, st.floats(0.0, 0.3), st.data())
+def test_drives_that_respond_later_follow_what_was_sent_earlier(
+    travels: list[float], speed: float, acceleration: float, response_s: float, data: st.DataObject
+) -> None:
+    echo_s = data.draw(st.integers(0, len(travels) - 1)) * PERIOD_S
+    now_s, held_s = (len(travels) - 1) * PERIOD_S + 0.01, 0.001
+    report = Report(echo_s, held_s, speed, FULL_M_S, None, response_s)
+    found = sent_every(travels).displacement(now_s, report, acceleration)
+    assert found is not None
+    # Before the first command nothing is known, and nothing counts.
+    reference = stepped(travels, now_s, max(echo_s + held_s - response_s, 0.0), speed, acceleration)
+    assert found.displacement_m == pytest.approx(reference.displacement_m, abs=2e-6)
+    assert found.speed_m_s == pytest.approx(reference.speed_m_s, abs=2e-3)
+
+
 @given(COMMANDS, SPEED, TRAVEL, st.data())
 def test_the_speed_given_to_the_newest_command_replaces_the_speed_asked_for(
     travels: list[float], speed: float, gives: float, data: st.DataObject
