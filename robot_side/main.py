@@ -20,8 +20,9 @@ from robot_side.core.robot_parts import RobotParts
 from robot_side.core.robot_side import RobotSide
 from robot_side.drivers.mujoco.viewpoints import first_person_eye, overview_eye
 from robot_side.drivers.remote.connected_drivers import ConnectedDrivers, driver_ports
-from robot_side.parts import build_parts, take_limits
+from robot_side.parts import build_parts
 from robot_side.recording.recorder import RobotEncoder, RobotRecorder
+from robot_side.said_limits import take_limits
 from robot_side.settings import RobotSettings
 from robot_side.tick.events import Listener
 from robot_side.tick.outgoing import SENT_STREAMS

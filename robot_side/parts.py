@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,7 +13,7 @@ from common.protocol.link_end import LinkEnd
 from common.roles import Role
 from common.timing.ages import LoopAge
 from robot_side.arm.following import Following
-from robot_side.arm.limits import ACCELERATION_RAD_S2, VELOCITY_RAD_S, ArmLimits, JointLimits
+from robot_side.arm.limits import JointLimits
 from robot_side.compiled.kernel import Compiled, imported_kernels
 from robot_side.core.robot_parts import RobotParts
 from robot_side.drivers.mujoco.arm import MujocoArm, stand
@@ -124,7 +124,7 @@ def build_parts(
     prediction, prediction_note = settings.prediction_for(scene.robot.fingerprint)
     errors = settings.uncertainty(prediction)
     encoder_sigma_rad = np.full(arm.joint_count, encoder.standard_deviation_rad())
-    inputs = LawInputs(errors, encoder_sigma_rad, limits, settings.motion, surroundings, settings.paper)
+    inputs = LawInputs(errors, encoder_sigma_rad, limits, settings.capped_motion, surroundings, settings.paper)
     law = make_law(settings.law if law is None else law, inputs)
     enlarged = EnlargedGripper(inputs)
 
@@ -157,40 +157,17 @@ def build_parts(
         misplaced_m=float(np.linalg.norm(errors.mean_m)) + max(errors.quantile, 0.0) * errors.camera_sd_m,
         home_rad=scene.data.qpos[scene.robot.arm_positions].copy(),
         frames=stick_frames(scene),
-        motion=settings.motion,
+        motion=settings.capped_motion,
         scene=scene,
         any_objects=settings.objects is not None,
         truth=SimulationObserver(scene) if settings.arm is None and settings.objects is None else None,
         held_covers=held_covers,
+        bounds=settings.bounds,
         assists=settings.assist == "speed",
         full_rate=settings.full_rate,
         seed=settings.seed,
         notes=(*notes, *late),
     )
-
-
-def take_limits(settings: RobotSettings, parts: SceneParts, drivers: ConnectedDrivers) -> tuple[RobotSettings, str]:
-    """Take the limits that the arm's driver says, where the settings give none.
-
-    Return the settings with them, as a recording keeps them, and a note for a person; no note without --arm.
-    """
-    if not drivers.has_arm:
-        return settings, ""
-    said, given = drivers.said_limits() or ArmLimits(), settings.arm_limits
-    limits = given.unless_known(said)
-    parts.limits.take(limits.of_joints(parts.arm.joint_count))
-    drivers.limits_taken()
-    whose = {
-        source: ", ".join(name for name, value in vars(of).items() if value is not None)
-        for source, of in (("the settings", given), ("its driver", said))
-    }
-    told = "; ".join(f"{names} from {source}" for source, names in whose.items() if names)
-    if limits.velocity_rad_s is None or limits.acceleration_rad_s2 is None:
-        told += ("; " if told else "") + (
-            f"not known: {VELOCITY_RAD_S:g} rad/s and {ACCELERATION_RAD_S2:g} rad/s² are assumed where they are missing"
-            " (to measure them: feelahead-robot --measure-limits)"
-        )
-    return replace(settings, arm_limits=limits), f"the arm's limits: {told}"
 
 
 def _episodes(settings: RobotSettings, arm: MujocoArm | RemoteArm, camera: MujocoCamera) -> Episodes:

@@ -1,7 +1,7 @@
 """Settings of the robot side, from the command line or a TOML file."""
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -12,6 +12,7 @@ from common.command.run_options import SideOptions
 from common.files.plugged import require_name
 from common.limits import check_limits, check_value
 from common.roles import Role
+from robot_side.arm.bounds import Bounds, KeepOut, Workspace
 from robot_side.arm.limits import ArmLimits
 from robot_side.arm.tool_motion import ToolMotionSettings
 from robot_side.drivers.mujoco.built_in_scenes import SceneName
@@ -100,6 +101,15 @@ class RobotSettings(PaperFlags, SideOptions):
     arm_limits: ArmLimits = field(default_factory=ArmLimits)
     """Limits of the arm's joints; the table [arm.limits] of a TOML file. Those that a driver says count where these are
     not given."""
+    arm_workspace: Annotated[Workspace | None, tyro.conf.Suppress] = None
+    """Only in a TOML file: [arm.workspace] lower_m and upper_m, corners of a box in the world frame. The tool's point
+    stays in it, and its sides are felt as walls."""
+    arm_keep_out: Annotated[tuple[KeepOut, ...], tyro.conf.Suppress] = ()
+    """Only in a TOML file: [[arm.keep_out]] center_m, half_sizes_m and quaternion of a box, which is perceived as an
+    obstacle whatever a camera sees."""
+    arm_fastest_m_s: Annotated[float, Meta(gt=0.0, le=5.0)] | None = None
+    """Greatest speed of the tool's point, for all motion together; none unless given. In a TOML file: [arm]
+    fastest_m_s."""
     simulated_limits: Annotated[ArmLimits | None, tyro.conf.Suppress] = None
     """Only in a TOML file: limits of the simulated arm that [arm.limits] does not know, for experiments."""
     objects: Annotated[str | None, tyro.conf.arg(metavar="tcp://HOST:PORT")] = None
@@ -159,6 +169,22 @@ class RobotSettings(PaperFlags, SideOptions):
             if self.objects is not None:
                 raise ValueError("--perception and --objects exclude each other; valid: one of them")
         self.uncertainty(PredictionErrors())
+
+    @property
+    def bounds(self) -> Bounds | None:
+        """Bounds of the tool's motion; None without any"""
+        found = Bounds(self.arm_workspace, self.arm_fastest_m_s)
+        return None if found == Bounds() else found
+
+    @property
+    def capped_motion(self) -> ToolMotionSettings:
+        """The tool's speeds at full travel and deflection, none above `arm_fastest_m_s`"""
+        fastest_m_s, motion = self.arm_fastest_m_s or math.inf, self.motion
+        return replace(
+            motion,
+            trigger_speed_m_s=min(motion.trigger_speed_m_s, fastest_m_s),
+            stick_speed_m_s=min(motion.stick_speed_m_s, fastest_m_s),
+        )
 
     def uncertainty(self, prediction: PredictionErrors) -> Uncertainty:
         """Return the inputs of eq. 9-10; ConfigurationError for a probability outside (0, 1)."""

@@ -108,5 +108,6 @@ try_out = Menu(
         "demo": "robot,operator",
         "haptics": "robot,operator",
         "latency": "robot,operator,experiments",
+        "limits": "robot,operator,experiments",
     },
 )

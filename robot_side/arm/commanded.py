@@ -7,6 +7,7 @@ import numpy as np
 
 from common.arrays import FloatArray, require_finite
 from common.protocol.messages import MotionCommand
+from robot_side.arm.bounds import Bounds
 from robot_side.arm.hindrance import Cause
 from robot_side.arm.limits import JointLimits
 from robot_side.arm.port import GripperPose
@@ -46,12 +47,13 @@ def commanded(
     settings: ToolMotionSettings,
     *,
     stands: bool = False,
+    bounds: Bounds | None = None,
 ) -> Commanded:
     """Return the joint velocities by `joint_velocities`, and the tool's motion that follows from them.
 
     The tool's motion leaves out joints that are commanded beyond their ends. joint_positions_rad (n,). stands: whether
-    a held object stands on something; there is then no motion downwards. ValueError for a pose that is not finite, as
-    nothing may move by it.
+    a held object stands on something; there is then no motion downwards. bounds: of the tool's motion. ValueError for a
+    pose that is not finite, as nothing may move by it.
     """
     linear, angular = tool_motion(command, settings)
     if joint_positions_rad.size != pose.tool_jacobian.shape[1]:
@@ -62,6 +64,10 @@ def commanded(
     twist: FloatArray = (np.array([linear, angular]) @ pose.tool_rotation.T).ravel()
     if stands:
         twist[2] = max(twist[2], 0.0)
+    asked_m_s, bounded = twist[:3].copy(), False
+    if bounds is not None:
+        twist[:3] = bounds.kept(asked_m_s, pose.tool_position_m, limits)
+        bounded = not np.allclose(twist[:3], asked_m_s)
     velocity = joint_velocities(pose.tool_jacobian, twist, limits.velocity_rad_s)
     lower, upper = limits.ends_rad
     stays = ((velocity < 0.0) & (joint_positions_rad <= lower + _AT_END_RAD)) | (
@@ -69,12 +75,15 @@ def commanded(
     )
     parts = _WEIGHTS * pose.tool_jacobian * velocity
     stopped: FloatArray = parts @ stays
+    twist[:3] = asked_m_s
     left = _WEIGHTS[:, 0] * twist - parts.sum(axis=1)
     commanded_m_s = float(pose.tool_rotation[:, 2] @ (parts @ ~stays)[:3])
     asked, undone = _WEIGHTS[:, 0] * twist, left + stopped
     asked_2, undone_2 = float(asked @ asked), float(undone @ undone)
     if undone_2 <= _LEAST * _LEAST * asked_2:
         return Commanded(velocity, commanded_m_s, 0.0, None, 0)
+    if bounded:
+        return Commanded(velocity, commanded_m_s, min(math.sqrt(undone_2 / asked_2), 1.0), Cause.BOUNDS, 0)
     cause, joint = Cause.JOINTS, 0
     shares = np.abs(velocity) / limits.velocity_rad_s
     if float(stopped @ stopped) >= float(left @ left):

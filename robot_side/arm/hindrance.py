@@ -18,6 +18,8 @@ class Cause(IntEnum):
     """A joint is at its limit of speed."""
     JOINTS = 4
     """An arm with fewer than six joints cannot make every motion."""
+    BOUNDS = 5
+    """The tool is at a side of the workspace, or at its greatest speed."""
 
 
 class Hindrance:
@@ -60,3 +62,5 @@ def _words(cause: Cause, joint: int) -> str:
             return f"joint {joint} at its fastest"
         case Cause.JOINTS:
             return "too few joints for this motion"
+        case Cause.BOUNDS:
+            return "at a bound of the workspace, or of speed"

@@ -5,6 +5,7 @@ from typing import Final
 import numpy as np
 
 from common.arrays import FloatArray
+from robot_side.arm.bounds import Bounds
 from robot_side.arm.commanded import commanded
 from robot_side.arm.following import Following
 from robot_side.arm.hindrance import Hindrance
@@ -30,8 +31,12 @@ class Motion:
         following: Following | None = None,
         *,
         assists: bool = False,
+        bounds: Bounds | None = None,
     ) -> None:
-        """following: judge of the arm's motion; a new one by default. assists: limit the speed along the triggers."""
+        """following: judge of the arm's motion; a new one by default. assists: limit the speed along the triggers.
+
+        bounds: of the tool's motion.
+        """
         self.commanded_rad_s: FloatArray | None = None
         """(n,) commanded joint velocities; None: the arm is to stand still"""
         self.commanded_m_s = self.rises_m_s = 0.0
@@ -39,6 +44,7 @@ class Motion:
         self.hindrance = Hindrance()
         self.following = following or Following(limits)
         self._arm, self._limits, self._settings, self._assists = arm, limits, settings, assists
+        self._bounds = bounds
         self._still: FloatArray = np.zeros(arm.joint_count)
 
     def command(
@@ -68,14 +74,18 @@ class Motion:
             command = assisted(command, sensed.l2, sensed.r2)
         if homeward is None:
             where = pose, state.joint_positions_rad, self._limits, self._settings
-            motion = commanded(command, *where, stands=grip.touchdown.stands)
+            motion = commanded(command, *where, stands=grip.touchdown.stands, bounds=self._bounds)
             velocity, self.commanded_m_s = motion.velocity_rad_s, motion.commanded_m_s
             self.hindrance.update(motion.undone, motion.cause, motion.joint)
         elif isinstance(homeward, str):
             velocity, self.commanded_m_s = self._still, 0.0
             self.hindrance.refuse(homeward)
         else:
-            velocity, self.commanded_m_s = homeward, float(pose.tool_rotation[:, 2] @ pose.tool_jacobian[:3] @ homeward)
+            velocity = homeward
+            if self._bounds is not None:
+                linear_m_s = pose.tool_jacobian[:3] @ homeward
+                velocity = self._bounds.share(linear_m_s, pose.tool_position_m, self._limits) * homeward
+            self.commanded_m_s = float(pose.tool_rotation[:, 2] @ pose.tool_jacobian[:3] @ velocity)
             self.hindrance.end()
         if self.following.text is not None:
             self.hindrance.find(self.following.text)

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 from common.arrays import FloatArray
 from common.timing.ages import LoopAge
+from robot_side.arm.bounds import Bounds
 from robot_side.arm.following import Following
 from robot_side.arm.limits import JointLimits
 from robot_side.arm.port import Arm, GripperKinematics
@@ -47,6 +48,8 @@ class RobotParts:
     truth: Observer | None = None
     """Observer of true contacts and distances, for the figures; None if these are unknown"""
     held_covers: HeldCovers | None = None
+    bounds: Bounds | None = None
+    """Bounds of the tool's motion; None: none"""
     assists: bool = False
     """Whether to limit the speed along the triggers (see `speed_assist`)"""
     full_rate: bool = False

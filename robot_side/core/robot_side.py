@@ -46,7 +46,8 @@ class RobotSide:
         self.parts, self.session = parts, parts.session
         self.sight = Sight(parts.camera, parts.surroundings)
         self.grip = Grip(parts.surroundings, parts.held_covers)
-        self.motion = Motion(parts.arm, parts.limits, parts.motion, parts.following, assists=parts.assists)
+        moving = parts.arm, parts.limits, parts.motion, parts.following
+        self.motion = Motion(*moving, assists=parts.assists, bounds=parts.bounds)
         home = parts.kinematics, parts.surroundings
         self.homing = None if parts.home_rad is None else Homing(parts.home_rad, parts.limits, *home)
         self.reports = Reports(parts.session, parts.law.around, parts.frames, full_rate=parts.full_rate)

@@ -21,6 +21,7 @@ from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.people.arming_hands import ArmingHands, constant_force
 from operator_side.people.port import Person
 from operator_side.settings import OperatorSettings
+from robot_side.arm.limits import ArmLimits
 from robot_side.compiled.warm_up import import_kernels, warm_up
 from robot_side.drivers.mujoco.robot_model import SiteAxis
 from robot_side.drivers.mujoco.true_contact import TrueContact
@@ -78,6 +79,10 @@ class Approach:
     """Period of both sides' turns"""
     camera_sd_m: float | None = None
     """Standard deviation σ_c of the camera's error, in metres; None: the default of the settings."""
+    arm_limits: ArmLimits = field(default_factory=ArmLimits)
+    """Limits of the arm that both sides know"""
+    simulated_limits: ArmLimits | None = None
+    """Limits of the simulated arm, if others than those"""
 
 
 class PullRun(Listener):
@@ -179,16 +184,20 @@ def robot_settings(approach: Approach) -> RobotSettings:
         full_rate=approach.full_rate,
         tick_period=approach.tick_period,
         camera=CameraSettings() if approach.camera_sd_m is None else CameraSettings(sd_m=approach.camera_sd_m),
+        arm_limits=approach.arm_limits,
+        simulated_limits=approach.simulated_limits,
     )
 
 
-def run_approach(approach: Approach) -> Outcome:
+def run_approach(approach: Approach, person: Person | None = None) -> Outcome:
     """Run one approach until a contact or its end. The same settings give the same outcome.
+
+    person: who pulls, instead of the constant force.
 
     Raises ConfigurationError if model or link cannot be used. The outcome is `failed` if the robot is not armed in time
     or touches something before the pull.
     """
-    run = PullRun(approach)
+    run = PullRun(approach, person)
     try:
         began_s = run.arm()
         for _ in run.go_on(began_s + approach.duration_s):
@@ -217,4 +226,5 @@ def _outcome(run: PullRun) -> Outcome:
         ended_s=float(trace.time_s[-1]),
         trace=trace,
         why=run.disarmed_because if end == "disarmed" else None,
+        later_ms=1e3 * run.loopback.robot.motion.following.stops.later_s,
     )

@@ -59,6 +59,8 @@ class Outcome:
     trace: Trace = field(repr=False)
     why: str | None = None
     """Reason for an end that says nothing about the law; None for other ends."""
+    later_ms: float = 0.0
+    """Time by which stops were later than the arm's limits said, as the robot side noticed"""
 
 
 def stands(trace: Trace) -> bool:

@@ -5,6 +5,7 @@ A pull is open loop: it does not depend on what is felt or on the objects ahead.
 
 import math
 from bisect import bisect_right
+from dataclasses import replace
 from typing import Final, Literal, get_args
 
 import numpy as np
@@ -53,6 +54,16 @@ def make_pull(kind: PullKind, seed: int) -> Pull:
         right_stick=stick if kind == "yaw" else (0.0, 0.0),
     )
     return lambda _: hands
+
+
+def no_stronger(pull: Pull, most_n: float) -> Pull:
+    """Return the pull with R2's force limited to `most_n`."""
+
+    def weaker(since_s: float) -> FingerInput:
+        hands = pull(since_s)
+        return replace(hands, r2_n=min(hands.r2_n, most_n))
+
+    return weaker
 
 
 def _bells(generator: np.random.Generator) -> Pull:
