@@ -1,0 +1,44 @@
+"""MJCF files of the FR3, made of franky-sim's: with the hand for the robot side, without it for franka-sim."""
+
+from pathlib import Path
+from typing import Final
+from xml.etree import ElementTree
+
+JOINTS: Final = tuple(f"fr3_joint{number}" for number in range(1, 8))
+START_RAD: Final = (0.0, 0.0, 0.0, -1.57, 0.0, 1.57, 0.785)
+"""Where franka-sim's arm starts: the tool is 0.52 m above the base, and looks down"""
+TIPS_M: Final = "0 0 0.1034"
+"""Point between the fingertips, in the hand's frame"""
+_WALL: Final = {"name": "wall", "type": "box", "size": "0.2 0.2 0.01", "pos": "0.554 0 0.15"}
+_TABLE: Final = {"name": "table", "type": "box", "size": "0.2 0.2 0.01", "pos": "0.554 0 0.25"}
+_TARGET: Final = {"name": "target", "type": "box", "size": "0.02 0.02 0.04", "pos": "0.554 0 0.3"}
+SCENES: Final = {"wall": (_WALL,), "target": (_TABLE, _TARGET)}
+"""What is below the tool: a lying wall that it comes to from above, or an object of 40 mm on a table"""
+
+
+def write_models(assets: Path, folder: Path) -> None:
+    """Write wall.xml, target.xml and arm.xml. assets: franky-sim's, with fr3.xml and meshes/."""
+    for name, things in SCENES.items():
+        tree = _read(assets)
+        hand = _body(tree, "hand")
+        hand.insert(0, ElementTree.Element("site", name="pinch", pos=TIPS_M))
+        world = tree.getroot().find("worldbody")
+        assert world is not None
+        for thing in things:
+            ElementTree.SubElement(world, "geom", thing)
+        tree.write(folder / f"{name}.xml")
+    tree = _read(assets)
+    _body(tree, "fr3_link7").remove(_body(tree, "hand"))
+    for name in ("tendon", "equality", "keyframe", "actuator"):  # all of them name parts of the hand
+        tree.getroot().remove(next(tree.getroot().iter(name)))
+    tree.write(folder / "arm.xml")
+
+
+def _read(assets: Path) -> ElementTree.ElementTree:
+    tree = ElementTree.parse(assets / "fr3.xml")  # noqa: S314  # of a wheel whose hash is locked
+    next(tree.getroot().iter("compiler")).set("meshdir", str(assets / "meshes"))
+    return tree
+
+
+def _body(tree: ElementTree.ElementTree, name: str) -> ElementTree.Element:
+    return next(body for body in tree.iter("body") if body.get("name") == name)
