@@ -13,7 +13,7 @@ export PYTHONDONTWRITEBYTECODE :=
 
 # A file that is only half made is made again.
 .DELETE_ON_ERROR:
-.PHONY: audit figures demo mutants sbom test quick types test-kernel test-two-hosts wide-area test-containers test-console test-quiet soak paper pictures notebook driving latency-experiment lock clean
+.PHONY: audit figures demo mutants sbom test quick types test-kernel test-arms arms-table test-two-hosts wide-area test-containers test-console test-quiet soak paper pictures notebook driving latency-experiment lock clean
 
 PIP = $(BIN)/python -m pip install --disable-pip-version-check
 PIP_LOG = $(VENV)/pip.log
@@ -67,6 +67,14 @@ SUITE = $(BIN)/python -m pytest -s -v
 test-kernel: export INSIDE = $(ARGS)
 test-kernel: $(VENV)/.installed ## a stock Linux kernel in QEMU drives a virtual controller, and so do we
 	$(SUITE) -m kernel tests/kernel
+
+# Needs Python 3.11 on x86_64; pip brings 430 MB at first. As root, peers and drivers have a real-time priority.
+test-arms: $(VENV)/.installed $(VENV)/.kernels ## the drivers for real arms with franka-sim and ROS 2's own client
+	$(SUITE) -m arms tests/arms $(ARGS)
+
+# Minutes, on a machine with nothing else to do: make arms-table ARGS="--peers franka --faults driver"
+arms-table: $(VENV)/.installed $(VENV)/.kernels ## the same as a table: when the arm stands, what the operator reads
+	$(BIN)/python -m tests.arms.table $(ARGS)
 
 # Needs root and iproute2.
 test-two-hosts: $(VENV)/.installed $(VENV)/.kernels ## docs/two-machines.md, followed on two hosts in network namespaces

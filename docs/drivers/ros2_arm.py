@@ -1,8 +1,8 @@
 """Driver of an arm under ROS 2 (rclpy), in your own ROS environment with pyzmq and msgpack.
 
 Usage: python ros2_arm.py positions|trajectory TOPIC JOINT,JOINT,... [NAME=VALUE ...], the joints in the model's order.
-TOPIC: of a controller that holds the last goal if this process dies. Names: address, loads (yes: efforts are loads),
-velocity_rad_s, acceleration_rad_s2, latency_s. /joint_states needs stamps and velocities; names come in any order.
+Names: address, loads (yes: efforts are loads), velocity_rad_s, acceleration_rad_s2, latency_s. TOPIC is that of a
+controller that holds the last goal if this process dies. /joint_states needs stamps and velocities, in any order.
 """
 
 import math
@@ -12,6 +12,7 @@ import time
 import msgpack
 import rclpy
 import zmq
+from rclpy.node import Node
 from rclpy.qos import qos_profile_sensor_data
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
@@ -21,22 +22,22 @@ PERIOD_S, LEAD_RAD, SILENT_S, AHEAD_NS, DRIFT_S = 0.01, 0.1, 0.1, 50_000_000, 1e
 KINDS = {"positions": Float64MultiArray, "trajectory": JointTrajectory}
 
 
-class Arm(rclpy.node.Node):
+class Arm(Node):
     """Arm whose joints are seen on /joint_states, and follow goals that are sent to a topic."""
 
     def __init__(self, kind: str, topic: str, joints: list[str], said: dict[str, str]) -> None:
         super().__init__("feelahead_arm")
         self.joints, self.seen, self.least_s, self.goals, self.loads = joints, {}, {}, (), "loads" in said
         self.newest, self.read_s = {"valid_until_s": -math.inf, "sent_s": None}, time.monotonic()
-        limits = {name: float(value) for name, value in said.items() if name.partition("_s")[1]}
-        limits = {name: one if name == "latency_s" else [one] * len(joints) for name, one in limits.items()}
+        numbers = {name: float(value) for name, value in said.items() if "_s" in name}
+        limits = {name: one if name == "latency_s" else [one] * len(joints) for name, one in numbers.items()}
         self.turned_s, self.state = self.read_s, {"version": 1, "sequence": 0, "limits": limits}
         self.kind, self.topic, self.out = kind, topic, self.create_publisher(KINDS[kind], topic, 1)
         self.create_subscription(JointState, "/joint_states", self.see, qos_profile_sensor_data)
         self.create_timer(PERIOD_S, self.turn)
-        self.socket = zmq.Context().socket(zmq.DEALER)
+        self.socket, address = zmq.Context().socket(zmq.DEALER), said.get("address", "tcp://127.0.0.1:5601")
         self.socket.sndhwm, self.socket.linger = 2, 0  # old states are useless
-        self.socket.connect(said.get("address", "tcp://127.0.0.1:5601"))
+        self.socket.connect(address)
 
     def see(self, message: JointState) -> None:
         """Keep what a message says of each joint; it is as old as it comes later than the quickest ones."""
@@ -72,10 +73,9 @@ class Arm(rclpy.node.Node):
         alone = self.count_publishers(self.topic) == 1 and self.count_subscribers(self.topic) > 0
         self.state["condition"] = "ready" if alone else "fault"
         self.state["condition_text"] = "" if alone else f"{self.topic}: valid: this sender alone, and a controller"
-        sent_s, sequence = time.monotonic(), self.state["sequence"] + 1
-        self.state |= {"sequence": sequence, "sent_s": sent_s, "measured_s": min(at_s), "echo_s": newest["sent_s"]}
+        self.state |= {"sent_s": (sent_s := time.monotonic()), "measured_s": min(at_s), "echo_s": newest["sent_s"]}
         self.state |= {"held_s": sent_s - self.read_s, "joint_positions": here, "joint_velocities": speeds}
-        self.state |= {"joint_loads": loads} if self.loads else {}
+        self.state |= {"sequence": self.state["sequence"] + 1} | ({"joint_loads": loads} if self.loads else {})
         if self.socket.poll(0, zmq.POLLOUT):  # there is a robot side
             self.socket.send(msgpack.packb(self.state))
 

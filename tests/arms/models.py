@@ -19,26 +19,24 @@ SCENES: Final = {"wall": (_WALL,), "target": (_TABLE, _TARGET)}
 def write_models(assets: Path, folder: Path) -> None:
     """Write wall.xml, target.xml and arm.xml. assets: franky-sim's, with fr3.xml and meshes/."""
     for name, things in SCENES.items():
-        tree = _read(assets)
-        hand = _body(tree, "hand")
+        root = _read(assets)
+        hand = _body(root, "hand")
         hand.insert(0, ElementTree.Element("site", name="pinch", pos=TIPS_M))
-        world = tree.getroot().find("worldbody")
-        assert world is not None
         for thing in things:
-            ElementTree.SubElement(world, "geom", thing)
-        tree.write(folder / f"{name}.xml")
-    tree = _read(assets)
-    _body(tree, "fr3_link7").remove(_body(tree, "hand"))
+            ElementTree.SubElement(next(root.iter("worldbody")), "geom", thing)
+        ElementTree.ElementTree(root).write(folder / f"{name}.xml")
+    root = _read(assets)
+    _body(root, "fr3_link7").remove(_body(root, "hand"))
     for name in ("tendon", "equality", "keyframe", "actuator"):  # all of them name parts of the hand
-        tree.getroot().remove(next(tree.getroot().iter(name)))
-    tree.write(folder / "arm.xml")
+        root.remove(next(root.iter(name)))
+    ElementTree.ElementTree(root).write(folder / "arm.xml")
 
 
-def _read(assets: Path) -> ElementTree.ElementTree:
-    tree = ElementTree.parse(assets / "fr3.xml")  # noqa: S314  # of a wheel whose hash is locked
-    next(tree.getroot().iter("compiler")).set("meshdir", str(assets / "meshes"))
-    return tree
+def _read(assets: Path) -> ElementTree.Element:
+    root = ElementTree.parse(assets / "fr3.xml").getroot()  # noqa: S314  # of a wheel whose hash is locked
+    next(root.iter("compiler")).set("meshdir", str(assets / "meshes"))
+    return root
 
 
-def _body(tree: ElementTree.ElementTree, name: str) -> ElementTree.Element:
-    return next(body for body in tree.iter("body") if body.get("name") == name)
+def _body(root: ElementTree.Element, name: str) -> ElementTree.Element:
+    return next(body for body in root.iter("body") if body.get("name") == name)

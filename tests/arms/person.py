@@ -15,3 +15,6 @@ class Pacing:
         height_m = seen.screen.tool_position_m[2]
         self._down = height_m > (LOW_M if self._down else HIGH_M)
         return FingerInput(r2_n=FORCE_N) if self._down else FingerInput(l2_n=FORCE_N)
+
+
+person = Pacing

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Final, NamedTuple
 
-import mujoco
+import mujoco  # type: ignore[import-untyped]
 import numpy as np
 
 from common.arrays import FloatArray

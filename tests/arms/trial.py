@@ -13,6 +13,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Final, Self
 
+import numpy as np
+
 from feelahead.both_sides.processes import SideProcess
 from tests.arms.models import JOINTS, START_RAD
 from tests.arms.positions import PositionLog, Positions
@@ -101,7 +103,7 @@ class Trial:
         self._stack, self._programs, self._model = ExitStack(), 0, model
         self._log = PositionLog(folder / "positions.csv")
         self.summary = folder / "robot.json"
-        self._listening: dict[str, Any] = {}
+        self._heard_s = self.lasted_s = 0.0
 
     def __enter__(self) -> Self:
         arguments = ["--bind=tcp://127.0.0.1:0", f"--arm={self.address}", "--no-cameras", f"--summary={self.summary}"]
@@ -116,6 +118,7 @@ class Trial:
         if self.operator is not None:
             self.operator.__exit__()
         self._stack.close()
+        self.lasted_s = time.monotonic() - self._heard_s
         for program in (self.driver, self.peer):
             if program is not None:
                 program.send(signal.SIGCONT)
@@ -142,6 +145,7 @@ class Trial:
 
     def begin_driver(self, joints: Sequence[str] = JOINTS) -> None:
         """Start the driver of docs/drivers."""
+        self._heard_s = time.monotonic() if self.driver is None else self._heard_s
         script = str(DRIVERS / f"{self.kind.peer}_arm.py")
         if self.kind.peer == "franka":
             self.driver = self.program(script, f"127.0.0.{self._number}", self.address)
@@ -153,17 +157,16 @@ class Trial:
         """Start an operator side with these hands; one that runs ends before."""
         if self.operator is not None:
             self.operator.__exit__()
-        if not self._listening:
-            self._listening = self.robot.wait_for("listening", LIMIT_S)
+        self.wait_until("the robot side listens", lambda: self._listening)
         ports = [f"--connect={self._listening['control']}", f"--view-connect={self._listening['view']}"]
         self.operator = SideProcess("operator_side", "operator", [*ports, "--device=simulated", *hands])
 
     def look(self) -> None:
         """Read the sides' events."""
         now_s = time.monotonic()
-        self.robot.check()
         for side in (self.robot, self.operator):
             if side is not None:
+                side.check()
                 self.events += [(now_s, side.name, event) for event in side.events()]
 
     def wait_until(self, what: str, holds: Callable[[], object], limit_s: float = LIMIT_S) -> None:
@@ -173,7 +176,15 @@ class Trial:
             self.look()
             return bool(holds())
 
-        wait_until(what, looked, limit_s, instead=lambda: (self.status("operator"), self.notes()[-4:]))
+        wait_until(what, looked, limit_s, instead=self._instead)
+
+    @property
+    def _listening(self) -> dict[str, Any]:
+        return next((event for _, _, event in self.events if event["event"] == "listening"), {})
+
+    def _instead(self) -> str:
+        programs = [f"{one.said.name}: {one.heard()[-200:]}" for one in (self.peer, self.driver) if one is not None]
+        return f"{self.status('operator').get('state')}; {self.notes()[-4:]}; {programs}"
 
     def watch(self, seconds: float) -> None:
         """Let time pass, and read the sides' events."""
@@ -207,6 +218,13 @@ class Trial:
         """Return whether the peer's arm has moved within the last third of a second."""
         now_s = time.monotonic()
         return self.positions().between(now_s - _MOVES_S, now_s).moved_rad() > MOVES_RAD
+
+    def fastest_rad_s(self) -> float:
+        """Return the greatest velocity of a joint until now, over 0.1 s."""
+        seen = self.positions()
+        apart = max(round(0.1 / float(np.median(np.diff(seen.times_s)))), 1)
+        ways = np.abs(seen.joints_rad[apart:] - seen.joints_rad[:-apart]).max(axis=1)
+        return float((ways / (seen.times_s[apart:] - seen.times_s[:-apart])).max())
 
     def rests(self, for_s: float = 2.0) -> bool:
         """Return whether the peer's arm has moved before, and not for `for_s`."""
