@@ -15,7 +15,7 @@ from msgspec import Meta
 
 from common.emulation.clauses import Chance, Outage, Rate
 from common.emulation.loss import GilbertElliott, RandomLoss
-from common.limits import Finite, Share, check_limits, check_value
+from common.limits import Finite, Limited, Share, check_limits, check_value
 from operator_side.dualsense.reports.feature_report import Firmware
 
 
@@ -116,3 +116,16 @@ def test_what_lies_just_outside_of_a_declared_range_is_refused(module: ModuleTyp
             for value in [value for of, meta in ranges(hint) for value in outside(of, meta)]:
                 with pytest.raises(ValueError, match=rf"^{name}\b.* = .*; valid: "):
                     kind(**(needed | {name: (value,) if of_elements else value}))
+
+
+@dataclass(frozen=True)
+class OneOrMany(Limited):
+    rate: Annotated[float, Meta(gt=0.0)] | tuple[Annotated[float, Meta(gt=0.0)], ...] | None = None
+
+
+def test_a_number_or_a_tuple_of_numbers_is_checked_as_what_it_is() -> None:
+    assert (OneOrMany(2.0).rate, OneOrMany((2.0, 3.0)).rate, OneOrMany().rate) == (2.0, (2.0, 3.0), None)
+    with pytest.raises(ValueError, match=r"rate = -1\.0; valid: above 0"):
+        OneOrMany(-1.0)
+    with pytest.raises(ValueError, match=r"rate\[1\] = -1\.0; valid: above 0"):
+        OneOrMany((2.0, -1.0))
