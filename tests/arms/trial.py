@@ -103,7 +103,6 @@ class Trial:
         self._stack, self._programs, self._model = ExitStack(), 0, model
         self._log = PositionLog(folder / "positions.csv")
         self.summary = folder / "robot.json"
-        self._heard_s = self.lasted_s = 0.0
 
     def __enter__(self) -> Self:
         arguments = ["--bind=tcp://127.0.0.1:0", f"--arm={self.address}", "--no-cameras", f"--summary={self.summary}"]
@@ -118,7 +117,6 @@ class Trial:
         if self.operator is not None:
             self.operator.__exit__()
         self._stack.close()
-        self.lasted_s = time.monotonic() - self._heard_s
         for program in (self.driver, self.peer):
             if program is not None:
                 program.send(signal.SIGCONT)
@@ -145,7 +143,6 @@ class Trial:
 
     def begin_driver(self, joints: Sequence[str] = JOINTS) -> None:
         """Start the driver of docs/drivers."""
-        self._heard_s = time.monotonic() if self.driver is None else self._heard_s
         script = str(DRIVERS / f"{self.kind.peer}_arm.py")
         if self.kind.peer == "franka":
             self.driver = self.program(script, f"127.0.0.{self._number}", self.address)
