@@ -56,9 +56,12 @@ class Program:
             self.process = subprocess.Popen(
                 command, stdout=out, stderr=out, stdin=subprocess.PIPE, text=True, cwd=ROOT, env=environment
             )
-        # A real arm does not share this machine's processors, and its driver would have this priority, too.
+
+    def hurry(self) -> "Program":
+        """Give it a real-time priority, if that is permitted: a real arm does not share this machine's processors."""
         with contextlib.suppress(PermissionError):
             os.sched_setscheduler(self.process.pid, os.SCHED_RR, os.sched_param(1))
+        return self
 
     def order(self, line: str) -> None:
         """Write a line to the program's standard input."""
@@ -138,17 +141,18 @@ class Trial:
         self._log.begin_anew()
         host = (f"127.0.0.{self._number}",) if self.kind.peer == "franka" else ()
         last = (self._between_m,) if host else STARTS
-        self.peer = self.program("-m", f"tests.arms.peers.{self.kind.peer}", *host, str(self._log.path), *last)
+        self.peer = self.program("-m", f"tests.arms.peers.{self.kind.peer}", *host, str(self._log.path), *last).hurry()
         wait_until("the peer says where it is", lambda: len(self.positions().times_s) > 10)
 
     def begin_driver(self, joints: Sequence[str] = JOINTS) -> None:
         """Start the driver of docs/drivers."""
         script = str(DRIVERS / f"{self.kind.peer}_arm.py")
         if self.kind.peer == "franka":
-            self.driver = self.program(script, f"127.0.0.{self._number}", self.address)
+            self.driver = self.program(script, f"127.0.0.{self._number}", self.address).hurry()
         else:
             words = (self.kind.controls, TOPIC[self.kind.controls], ",".join(joints), f"address={self.address}")
-            self.driver = self.program(script, *words, "velocity_rad_s=2.0", "acceleration_rad_s2=12", "latency_s=0.05")
+            limits = ("velocity_rad_s=2.0", "acceleration_rad_s2=12", "latency_s=0.05")
+            self.driver = self.program(script, *words, *limits).hurry()
 
     def begin_operator(self, hands: Sequence[str]) -> None:
         """Start an operator side with these hands; one that runs ends before."""
