@@ -18,6 +18,7 @@ SCENES: Final = {"wall": (_WALL,), "target": (_TABLE, _TARGET)}
 
 def write_models(assets: Path, folder: Path) -> None:
     """Write wall.xml, target.xml and arm.xml. assets: franky-sim's, with fr3.xml and meshes/."""
+    folder.mkdir(exist_ok=True)
     for name, things in SCENES.items():
         root = _read(assets)
         hand = _body(root, "hand")

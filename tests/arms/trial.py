@@ -137,7 +137,8 @@ class Trial:
         return Program([self._python, *words], self._folder / f"program-{self._programs}.txt", self._environment)
 
     def begin_peer(self) -> None:
-        """Start the peer, and wait until it serves; its log begins anew."""
+        """Start the peer once the robot side waits for it, and wait until it serves; its log begins anew."""
+        self.wait_until("the robot side waits", lambda: any("waiting for an arm" in note for note in self.notes()))
         self._log.begin_anew()
         host = (f"127.0.0.{self._number}",) if self.kind.peer == "franka" else ()
         last = (self._between_m,) if host else STARTS
