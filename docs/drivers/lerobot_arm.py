@@ -1,155 +1,90 @@
-"""Driver of an arm by LeRobot's `Robot` interface (0.4), for your own LeRobot environment with pyzmq and msgpack.
+"""Driver of an SO-101 by LeRobot's own `Robot` (0.6.1; 0.4.4, too), in LeRobot's environment with pyzmq and msgpack.
 
-    from lerobot.robots.so_follower import SO101Follower, SOFollowerRobotConfig
-    from lerobot_arm import drive
-
-    config = SOFollowerRobotConfig(
-        port="/dev/ttyACM0", id="mine", max_relative_target=5.0, disable_torque_on_disconnect=False
-    )
-    with SO101Follower(config) as robot:
-        joints = ["shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex", "wrist_roll"]
-        drive(robot, "tcp://127.0.0.1:5601", joints, gripper="gripper", opening_m=0.08)
-
-The robot takes goals of joint positions in degrees (`use_degrees`), the gripper's from 0, closed, to 100. This driver
-integrates velocities into goals, and holds the last goal from `valid_until_s` on. A goal leads a joint by at most
-LEAD_RAD: the force on an obstacle does not grow further.
+Usage: python lerobot_arm.py /dev/ttyACM0 ID tcp://127.0.0.1:5601, with the ID of LeRobot's calibration.
 """
 
-import contextlib
 import math
+import sys
 import time
-from collections.abc import Sequence
 from typing import Any
 
 import msgpack
 import zmq
 
-LEAD_RAD = 0.1
-"""Largest lead of a goal over its joint. A weak arm needs some: its motors' torque grows with the lead."""
-LONGEST_TURN_S = 0.1
-"""Longest time, in seconds, for which one turn moves the goals: a bus may hang."""
-SMOOTHING_S = 0.05
-"""Time constant, in seconds, of the velocities, which are filtered differences of positions."""
-GRIPPER_PER_S = 150.0
-"""Full speed of the gripper, in hundredths of the travel a second"""
-HELD = 8.0
-"""Distance from its goal, in hundredths, at which a closing gripper that stands holds something"""
-STANDS = 0.5
-"""Motion from one turn to the next, in hundredths, below which the gripper stands"""
+JOINTS = ("shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex", "wrist_roll")  # in the model's order
+SCALES = dict.fromkeys(JOINTS, math.pi / 180.0) | {"gripper": 0.01}  # of LeRobot's degrees, and of 0, closed, to 100
+OPENING_M, CLOSED_RAD, OPEN_RAD = 0.112, -0.174, 1.745  # gap of the open gripper; angles of its jaw in the model
+LIMITS = {"velocity_rad_s": [1.0] * 5, "acceleration_rad_s2": [8.0] * 5, "latency_s": 0.07}  # assumed, not measured
+LEAD, HELD = 0.1, 0.06  # lead of a goal, which bounds the force on an obstacle; lead of a jaw that holds something
+CLOSING_PER_S, STANDS_PER_S, FILTER_S = 1.5, 0.1, 0.05  # gripper's full speed, and when it stands; time of velocities
+GAP_S, GIVE_UP_S = 0.1, 3.0  # time without readings after which it is a fault, and after which the driver ends
+FAULTS = {1: "voltage", 2: "encoder", 4: "temperature", 8: "current", 32: "overload"}  # bits of a servo's status
+NOTHING = {"joint_velocities": [0.0] * 5, "closing": 0.0, "valid_until_s": -math.inf}  # command before the first
 
 
-class VelocityArm:
-    """Velocity interface of a robot: goals from velocities, states from observations; times by one monotonic clock."""
+class Driver:
+    """Arm's end of the port: goals move as told, whatever is read, wait for joints, stand from `valid_until_s` on."""
 
-    def __init__(
-        self, robot: Any, joints: Sequence[str], gripper: str | None, opening_m: float, signs: Sequence[float] | None
-    ) -> None:
-        """joints (n,): LeRobot's names, in the model's order. signs (n,): -1 for a joint of opposite direction."""
-        self._robot, self._joints, self._gripper, self._opening_m = robot, list(joints), gripper, opening_m
-        self._signs = list(signs or [1.0] * len(self._joints))
-        self._read_s = self._obeyed_s = -math.inf
-        self._velocities = [0.0] * len(self._joints)
-        self._positions = [0.0] * len(self._joints)
-        self._open = self._goal_open = 100.0
-        self._stood = 0
-        self._closing = 0.0
-        self._goals: list[float] = []
-        self._command: dict[str, Any] | None = None
+    def __init__(self, address: str) -> None:
+        self._socket = zmq.Context().socket(zmq.DEALER)
+        self._socket.sndhwm, self._socket.linger = 2, 0
+        self._socket.connect(address)
+        self._command, self._read_s, self._sequence, self._at_s = dict[str, Any](NOTHING), math.inf, 0, -math.inf
+        self._here, self._goals, self._speeds = list[float](), list[float](), [0.0] * len(SCALES)
 
-    def obey(self, command: dict[str, Any]) -> None:
-        """Follow another command from now on."""
-        self._command = command
+    def turn(self, seen: dict[str, Any], at_s: float, fault: str = "") -> dict[str, float]:
+        """Take an observation that began at `at_s`, send the state, take the newest command; return the goals."""
+        here, passed_s = [float(seen[f"{name}.pos"]) * scale for name, scale in SCALES.items()], at_s - self._at_s
+        share, moves = -math.expm1(-passed_s / FILTER_S), zip(self._speeds, self._here or here, here, strict=True)
+        self._speeds = [old + share * ((new - was) / passed_s - old) for old, was, new in moves]
+        self._at_s, self._here, self._goals = at_s, here, self._goals or here
+        self.send(fault)
+        valid_s = max(min(self._command["valid_until_s"] - at_s + passed_s, passed_s), 0.0) if passed_s < GAP_S else 0.0
+        told = *self._command["joint_velocities"], -CLOSING_PER_S * self._command["closing"]
+        ways = [(goal, goal + speed * valid_s, at) for goal, speed, at in zip(self._goals, told, here, strict=True)]
+        self._goals = [new if abs(new - at) < max(LEAD, abs(old - at)) else old for old, new, at in ways]
+        return {f"{name}.pos": goal / scale for (name, scale), goal in zip(SCALES.items(), self._goals, strict=True)}
 
-    def measure(self, now_s: float) -> dict[str, Any]:
-        """Read the arm; return the measured fields of a state."""
-        seen = self._robot.get_observation()
-        positions = [
-            sign * math.radians(seen[f"{name}.pos"]) for name, sign in zip(self._joints, self._signs, strict=True)
-        ]
-        passed_s = now_s - self._read_s
-        if math.isfinite(passed_s) and passed_s > 0.0:
-            share = 1.0 - math.exp(-passed_s / SMOOTHING_S)
-            self._velocities = [
-                old + share * ((there - here) / passed_s - old)
-                for old, here, there in zip(self._velocities, self._positions, positions, strict=True)
-            ]
-        self._positions, self._read_s = positions, now_s
-        state: dict[str, Any] = {
-            "measured_s": now_s,
-            "joint_positions": positions,
-            "joint_velocities": list(self._velocities),
-        }
-        if self._gripper is not None:
-            was, self._open = self._open, min(max(float(seen[f"{self._gripper}.pos"]), 0.0), 100.0)
-            # A gripper that closes on nothing also lags its goal, but moves.
-            self._stood = self._stood + 1 if abs(was - self._open) < STANDS else 0
-            state["opening_m"] = self._opening_m * self._open / 100.0
-            state["holding"] = self._closing > 0.0 and self._open - self._goal_open > HELD and self._stood >= 3
-        return state
-
-    def move(self, now_s: float) -> None:
-        """Advance the goals by the valid part of the command; send them."""
-        command = self._command
-        passed_s, self._obeyed_s = now_s - self._obeyed_s, now_s
-        if not self._goals:
-            self._goals, self._goal_open, passed_s = list(self._positions), self._open, 0.0
-        if command is not None and math.isfinite(passed_s):
-            # A command that expired since the last turn counts until then.
-            valid_s = min(passed_s, LONGEST_TURN_S, max(command["valid_until_s"] - (now_s - passed_s), 0.0))
-            self._goals = [
-                min(max(goal + speed * valid_s, here - LEAD_RAD), here + LEAD_RAD) if speed else goal
-                for goal, speed, here in zip(self._goals, command["joint_velocities"], self._positions, strict=True)
-            ]
-            # The grip lasts until the gripper is opened.
-            self._closing = (valid_s > 0.0 and command["closing"]) or self._closing
-            self._goal_open -= command["closing"] * GRIPPER_PER_S * valid_s
-            self._goal_open = min(max(self._goal_open, self._open - 2.0 * HELD, 0.0), self._open + 2.0 * HELD, 100.0)
-        goals = zip(self._joints, self._signs, self._goals, strict=True)
-        action = {f"{name}.pos": math.degrees(sign * goal) for name, sign, goal in goals}
-        if self._gripper is not None:
-            action[f"{self._gripper}.pos"] = self._goal_open
-        self._robot.send_action(action)
-
-
-def drive(
-    robot: Any,
-    address: str,
-    joints: Sequence[str],
-    *,
-    gripper: str | None = None,
-    opening_m: float = 0.0,
-    signs: Sequence[float] | None = None,
-    rate_hz: float = 50.0,
-) -> None:
-    """Drive a connected robot until Ctrl-C; arguments as for VelocityArm. opening_m: free gap of the open gripper."""
-    socket = zmq.Context().socket(zmq.DEALER)
-    socket.setsockopt(zmq.SNDHWM, 2)
-    socket.setsockopt(zmq.LINGER, 0)
-    socket.connect(address)
-    arm = VelocityArm(robot, joints, gripper, opening_m, signs)
-    newest, read_s, sequence, next_s = None, 0.0, 0, time.monotonic()
-    while True:
-        try:
-            state = arm.measure(time.monotonic())
-        except ConnectionError as error:
-            # A packet was lost on the bus: send no state; after 0.1 s without states the arm counts as lost.
-            print("bus:", error, flush=True)
-            time.sleep(1.0 / rate_hz)
-            continue
-        while socket.poll(0):  # read all, obey the newest
-            message = msgpack.unpackb(socket.recv())
+    def send(self, fault: str = "") -> None:
+        """Send the newest observation as the arm's state, with a fault in words if there is one; take commands."""
+        while self._socket.poll(0):
+            message = msgpack.unpackb(self._socket.recv())
             if "refused" in message:
                 print("refused:", message["refused"], flush=True)
             else:
-                newest, read_s = message, time.monotonic()
-                arm.obey(newest)
-        with contextlib.suppress(ConnectionError):
-            arm.move(time.monotonic())
-        sequence, sent_s = sequence + 1, time.monotonic()
-        state |= {"version": 1, "sequence": sequence, "sent_s": sent_s}
-        if newest is not None:
-            state |= {"echo_s": newest["sent_s"], "held_s": sent_s - read_s}
-        with contextlib.suppress(zmq.Again):  # no robot side yet
-            socket.send(msgpack.packb(state), zmq.NOBLOCK)
-        next_s = max(next_s + 1.0 / rate_hz, sent_s)
-        time.sleep(max(next_s - time.monotonic(), 0.0))
+                self._command, self._read_s = message, time.monotonic()
+        (*joints, jaw), self._sequence, sent_s = self._here, self._sequence + 1, time.monotonic()
+        state = {"version": 1, "sequence": self._sequence, "sent_s": sent_s, "measured_s": self._at_s, "limits": LIMITS}
+        state |= {"echo_s": self._command.get("sent_s"), "held_s": max(sent_s - self._read_s, 0.0)}
+        state |= {"joint_positions": joints, "joint_velocities": self._speeds[:-1]}
+        state |= {"opening_m": OPENING_M * jaw, "finger_positions": [CLOSED_RAD + (OPEN_RAD - CLOSED_RAD) * jaw]}
+        state |= {"holding": jaw > HELD and jaw - self._goals[-1] > HELD and abs(self._speeds[-1]) < STANDS_PER_S}
+        state |= {"condition": "fault" if fault else "ready", "condition_text": fault[:200]}
+        if self._socket.poll(0, zmq.POLLOUT):  # else there is no robot side yet
+            self._socket.send(msgpack.packb(state))
+
+
+def drive(robot: Any, address: str, rate_hz: float = 50.0) -> None:
+    """Drive a connected robot until Ctrl-C; SystemExit with one line if its bus is dead for GIVE_UP_S."""
+    driver, good_s = Driver(address), time.monotonic()
+    while True:
+        began_s = time.monotonic()
+        try:
+            seen, status = robot.get_observation(), robot.bus.sync_read("Status", normalize=False).items()
+            faults = [f"{name}: {word}" for name, bits in status for bit, word in FAULTS.items() if bits & bit]
+            robot.send_action(driver.turn(seen, began_s, ", ".join(faults)))
+            good_s = began_s
+        except Exception as error:  # the libraries of a bus raise many kinds
+            dead_s, why = time.monotonic() - good_s, f"servo bus: {str(error).strip().partition(chr(10))[0]}"
+            if dead_s > GIVE_UP_S:
+                raise SystemExit(f"{why} (for {dead_s:.1f} s; check its power and its plugs)") from None
+            if dead_s > GAP_S:
+                driver.send(why)
+        time.sleep(max(began_s + 1.0 / rate_hz - time.monotonic(), 0.0))
+
+
+if __name__ == "__main__":
+    from lerobot.robots.so_follower import SO101Follower, SOFollowerRobotConfig
+
+    with SO101Follower(SOFollowerRobotConfig(sys.argv[1], False, id=sys.argv[2], use_degrees=True)) as arm:
+        drive(arm, sys.argv[3])

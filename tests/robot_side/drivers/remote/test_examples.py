@@ -1,15 +1,11 @@
-"""The examples of docs/drivers: run as processes over real sockets; for LeRobot, with a fake of its interface."""
+"""The examples of docs/drivers that need nothing else: run as processes over real sockets."""
 
 import contextlib
-import importlib.util
-import math
 import shutil
 import signal
 import subprocess
 from collections.abc import Iterator
 from pathlib import Path
-from types import ModuleType
-from typing import Any
 
 import numpy as np
 import pytest
@@ -135,73 +131,3 @@ def test_the_example_in_cpp_packs_what_the_robot_side_reads(tmp_path: Path) -> N
         ("table", True, None),
         ("target", False, 0.03),
     ]
-
-
-def lerobot_arm() -> ModuleType:
-    """Import the example driver for LeRobot's arms from its file; return the module."""
-    found = importlib.util.spec_from_file_location("lerobot_arm", EXAMPLES / "lerobot_arm.py")
-    assert found is not None
-    assert found.loader is not None
-    module = importlib.util.module_from_spec(found)
-    found.loader.exec_module(module)
-    return module
-
-
-class FakeFollower:
-    """Robot with the interface of LeRobot 0.4, which reaches each goal at once; only its gripper may be blocked."""
-
-    def __init__(self) -> None:
-        self.at = {"shoulder_pan.pos": 10.0, "elbow_flex.pos": -20.0, "gripper.pos": 100.0}
-        self.blocked_at = 0.0
-
-    def get_observation(self) -> dict[str, Any]:
-        return dict(self.at)
-
-    def send_action(self, action: dict[str, Any]) -> dict[str, Any]:
-        assert action.keys() == self.at.keys()
-        self.at = action | {"gripper.pos": max(action["gripper.pos"], self.blocked_at)}
-        return action
-
-
-def lerobot_turns(arm: Any, since_s: float, turns: int, command: dict[str, Any] | None = None) -> dict[str, Any]:
-    """Run turns of the example driver at 50 Hz, each with `command`; return the last state."""
-    state: dict[str, Any] = {}
-    for turn in range(turns):
-        now_s = since_s + 0.02 * turn
-        state = arm.measure(now_s)
-        if command is not None:
-            arm.obey(command)
-        arm.move(now_s)
-    return state
-
-
-def test_an_arm_of_lerobot_integrates_holds_and_stops_by_itself() -> None:
-    follower = FakeFollower()
-    arm = lerobot_arm().VelocityArm(follower, ["shoulder_pan", "elbow_flex"], "gripper", 0.08, [1.0, -1.0])
-    state = lerobot_turns(arm, 10.0, 2)
-    assert state["joint_positions"] == pytest.approx([math.radians(10.0), math.radians(20.0)])
-    moving = {"joint_velocities": [0.1, 0.2], "closing": 0.0, "valid_until_s": 10.54}
-    state = lerobot_turns(arm, 10.04, 50, moving)
-    assert state["joint_positions"] == pytest.approx([math.radians(10.0) + 0.05, math.radians(20.0) + 0.1], abs=0.005)
-    assert follower.at["elbow_flex.pos"] == pytest.approx(-20.0 - math.degrees(0.1), abs=0.3)
-    assert state["joint_velocities"] == pytest.approx([0.0, 0.0], abs=1e-3)
-
-
-def test_an_arm_of_lerobot_holds_what_its_gripper_cannot_close_on_and_is_not_pushed_far() -> None:
-    follower = FakeFollower()
-    follower.blocked_at = 40.0
-    arm = lerobot_arm().VelocityArm(follower, ["shoulder_pan", "elbow_flex"], "gripper", 0.08, None)
-    state = lerobot_turns(arm, 0.0, 2)
-    assert (state["opening_m"], state["holding"]) == (pytest.approx(0.08), False)
-    state = lerobot_turns(arm, 0.04, 60, {"joint_velocities": [0.0, 0.0], "closing": 1.0, "valid_until_s": 1.0})
-    assert (state["opening_m"], state["holding"]) == (pytest.approx(0.032), True)
-    held = follower.at["shoulder_pan.pos"]
-    follower.send_action = lambda action: action  # type: ignore[method-assign]  # something holds the arm up
-    lerobot_turns(arm, 2.0, 200, {"joint_velocities": [0.5, 0.0], "closing": 0.0, "valid_until_s": 100.0})
-    assert math.radians(math.degrees(arm._goals[0]) - held) == pytest.approx(0.1)
-    # A bus that hung for a second moves the goals by no more than a tenth of a second's motion.
-    follower = FakeFollower()
-    arm = lerobot_arm().VelocityArm(follower, ["shoulder_pan", "elbow_flex"], "gripper", 0.08, None)
-    lerobot_turns(arm, 0.0, 2)
-    lerobot_turns(arm, 5.0, 1, {"joint_velocities": [0.5, 0.0], "closing": 0.0, "valid_until_s": 6.0})
-    assert follower.at["shoulder_pan.pos"] == pytest.approx(10.0 + math.degrees(0.05))

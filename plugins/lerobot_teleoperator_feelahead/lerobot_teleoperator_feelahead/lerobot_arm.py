@@ -1,0 +1,1 @@
+../../../docs/drivers/lerobot_arm.py
