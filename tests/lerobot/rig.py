@@ -130,6 +130,8 @@ class Rig:
 
     def look(self) -> str:
         """Take what both sides said since the last look; return the arm's state as the operator reads it."""
+        self.robot.check()
+        self.operator.check()
         for event in self.robot.events():
             if event["event"] == "note":
                 self.notes.append(str(event["text"]))
