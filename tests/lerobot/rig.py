@@ -46,7 +46,7 @@ def teleoperate(bus: ServoBus, address: str, _: Path) -> list[str]:
 def record(bus: ServoBus, address: str, folder: Path) -> list[str]:
     """Return the command of lerobot-record with the plug-in: one episode of some seconds, in FOLDER/dataset."""
     given = [f"--dataset.root={folder / 'dataset'}", "--dataset.repo_id=nobody/emulated", "--dataset.single_task=Touch"]
-    given += ["--dataset.num_episodes=1", "--dataset.episode_time_s=10", "--dataset.push_to_hub=false"]
+    given += ["--dataset.num_episodes=1", "--dataset.episode_time_s=30", "--dataset.push_to_hub=false"]
     return [_program("lerobot-record"), *_plugged(bus, address), *given, "--play_sounds=false"]
 
 

@@ -63,6 +63,8 @@ def approach(driver: str, folder: Path, seconds: float = 8.0) -> Approach:
         rig.wait_for("armed")
         began_m = rig.truth.distance_m(rig.bus.history[0][1])
         rig.pause(seconds)
+        if driver == "lerobot-record":  # it ends by itself, after it has written its episode
+            wait_until("the end of lerobot-record", rig.driver.poll)
         rig.operator.stop()
         connected_s = time.monotonic() - rig.connected_s
         rig.robot.stop()
