@@ -42,6 +42,7 @@ from robot_side.gripper.kept_covers import SearchNotes
 from robot_side.laws.enlarged_gripper import EnlargedGripper
 from robot_side.laws.inputs import LawInputs
 from robot_side.laws.named import make_law
+from robot_side.laws.vicinity import misplaced_m
 from robot_side.operators.episodes import Episodes
 from robot_side.operators.operator_session import OperatorSession
 from robot_side.operators.safety import Safety
@@ -154,7 +155,7 @@ def build_parts(
         loop_age=LoopAge(settings.assumed_delay_s),
         limits=limits,
         following=Following(limits, joint_names(scene)[0], encoder.standard_deviation_rad()),
-        misplaced_m=float(np.linalg.norm(errors.mean_m)) + max(errors.quantile, 0.0) * errors.camera_sd_m,
+        misplaced_m=lambda objects: misplaced_m(objects, errors),
         home_rad=scene.data.qpos[scene.robot.arm_positions].copy(),
         frames=stick_frames(scene),
         motion=settings.capped_motion,

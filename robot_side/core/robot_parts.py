@@ -1,5 +1,6 @@
 """Parts of which a core is made."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from common.arrays import FloatArray
@@ -14,7 +15,7 @@ from robot_side.gripper.held_covers import HeldCovers
 from robot_side.laws.law import Law
 from robot_side.operators.operator_session import OperatorSession
 from robot_side.outcome.figures import Observer
-from robot_side.surroundings.perceived import ObjectSource
+from robot_side.surroundings.perceived import ObjectSource, PerceivedObjects
 from robot_side.surroundings.surroundings import Surroundings
 from robot_side.tick.explained import Overlapping
 
@@ -37,8 +38,8 @@ class RobotParts:
     motion: ToolMotionSettings
     following: Following | None = None
     """Judge of the arm's motion; None: one that tells joints by their numbers"""
-    misplaced_m: float = 0.01
-    """Distance by which things may be nearer than they are perceived, by the errors of camera and arm"""
+    misplaced_m: Callable[[PerceivedObjects], float] = lambda _: 0.01
+    """Distance by which a frame's things may be nearer than they are perceived, by the errors of camera and arm"""
     home_rad: FloatArray | None = None
     """(n,) joint positions of the start pose; None: there is no way home"""
     frames: StickFrames | None = None

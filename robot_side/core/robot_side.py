@@ -184,7 +184,7 @@ class RobotSide:
             np.concatenate([pose.sphere_centers_m, centers_m[swings]]),
             np.concatenate([pose.sphere_radii_m, radii_m[swings]]),
         )
-        near = np.isfinite(object_distances(*spheres, scene, CLEAR_M + self.parts.misplaced_m))
+        near = np.isfinite(object_distances(*spheres, scene, CLEAR_M + self.parts.misplaced_m(situation.objects)))
         return any(index != self.grip.index for index in np.flatnonzero(near).tolist())
 
     def observe(self, now_s: float) -> list[Outgoing]:

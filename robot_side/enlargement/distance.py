@@ -87,7 +87,7 @@ class Uncertainty:
     camera_mean_m: Vector3 = (0.0, 0.0, 0.0)
     """Mean μ_c of the camera's error, true minus perceived position"""
     camera_sd_m: float = 0.0
-    """Standard deviation σ_c of the camera's error along each axis"""
+    """Standard deviation σ_c of the camera's error along each axis, of objects that say none of their own"""
     kinematic_mean_m: Vector3 = (0.0, 0.0, 0.0)
     """Mean μ_ee of the gripper's position error, true minus estimated position"""
     prediction: PredictionErrors = field(default_factory=PredictionErrors)
@@ -119,15 +119,21 @@ class Uncertainty:
 
 
 def plain_enlargements_m(
-    uncertainty: Uncertainty, covariances: FloatArray, velocities_m_s: FloatArray, loop_age_s: float
+    uncertainty: Uncertainty,
+    covariances: FloatArray,
+    velocities_m_s: FloatArray,
+    loop_age_s: float,
+    camera: tuple[float, float] | None = None,
 ) -> FloatArray:
     """Return D_incr (m,) of each sphere as the paper prints it: equal in all directions, from |v| t_d and Σ's trace.
 
     The length of μ_c is the vector's: √3 times the mean along one axis if all axes have the same mean.
-    covariances (m, 3, 3) from `position_covariance`, velocities_m_s (m, 3) of the spheres' centres.
+    covariances (m, 3, 3) from `position_covariance`, velocities_m_s (m, 3) of the spheres' centres. camera: unseen
+    motion in m and σ_c² in m² of an object; None: those of `uncertainty`.
     """
-    mean_m = math.hypot(*uncertainty.kinematic_mean_m) + math.hypot(*uncertainty.camera_mean_m)
-    variance_m2 = np.trace(covariances, axis1=-2, axis2=-1) + uncertainty.camera_sd_m**2
+    unseen_m, camera_m2 = (0.0, uncertainty.camera_sd_m**2) if camera is None else camera
+    mean_m = unseen_m + math.hypot(*uncertainty.kinematic_mean_m) + math.hypot(*uncertainty.camera_mean_m)
+    variance_m2 = np.trace(covariances, axis1=-2, axis2=-1) + camera_m2
     speeds_m_s = np.sqrt(np.einsum("mi,mi->m", velocities_m_s, velocities_m_s))
     found = enlargement_distance(uncertainty.probability, mean_m, variance_m2, speeds_m_s * loop_age_s)
     return np.asarray(found)

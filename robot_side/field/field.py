@@ -14,6 +14,7 @@ from robot_side.field.scratch import Scratch
 from robot_side.surroundings.scene_table import SceneTable
 
 _STILL: FloatArray = np.empty(0)
+_ALIKE: FloatArray = np.empty((0, 2))
 
 
 @dataclass(frozen=True)
@@ -26,7 +27,7 @@ class Field:
     be touched has strength 4 at most. Its onset distances are those of its expected position, without the spread
     D_σ(P) - D_σ(0.5)."""
     sigmas_m: FloatArray
-    """(m,) D_σ of each of the gripper's spheres"""
+    """(m,) D_σ of each of the gripper's spheres, towards the object with the largest errors"""
     counts: IntArray
     """Counts of the look's work, indexed by `Count`"""
 
@@ -70,19 +71,19 @@ class Ahead:
         """
         objects = len(scene.first_rows) - 1
         approach_m = _STILL if along.approach_m is None else along.approach_m
-        if len(classes) != objects or len(approach_m) not in (0, objects):
+        of_objects = _ALIKE if along.of_objects is None else along.of_objects
+        if len(classes) != objects or not {len(approach_m), len(of_objects)} <= {0, objects}:
             raise ValueError(
-                f"classes has {len(classes)} entries, approach_m has {len(approach_m)};"
-                f" valid: one for each of {objects} objects"
+                f"classes has {len(classes)} entries, approach_m has {len(approach_m)}, of_objects has"
+                f" {len(of_objects)}; valid: one for each of {objects} objects"
             )
         needed = len(pose.sphere_radii_m), len(scene.kinds), len(scene.first_rows)
         if not self.scratch.fits(*needed):
             self.scratch = Scratch(*needed)
         scratch = self.scratch
-        errors = DirectionalErrors(
-            along.mean_m, along.variance_m2, along.mean_along_m, along.variance_along_m2, along.quantile
-        )
-        around = widest_m, along.reach_m, classes, approach_m, scene.bundle, scratch.bundle
+        prediction = along.mean_along_m, along.variance_along_m2
+        errors = DirectionalErrors(along.mean_m, along.variance_m2, *prediction, along.quantile, along.unseen_m)
+        around = widest_m, along.reach_m, classes, approach_m, of_objects, scene.bundle, scratch.bundle
         found = look(
             *(np.ascontiguousarray(pose.sphere_centers_m), pose.sphere_radii_m, pose.sphere_on_finger),
             *(pose.tool_position_m, np.ascontiguousarray(pose.tool_jacobian), self._encoder_variance),
@@ -98,10 +99,9 @@ def _refuse(pose: GripperPose, along: Along) -> NoReturn:
     """Raise a ValueError that names the field of `pose` or `along` that is not finite."""
     for name in ("tool_position_m", "tool_jacobian", "sphere_centers_m", "sphere_radii_m"):
         require_finite(f"pose.{name}", getattr(pose, name))
-    for name in ("direction", "mean_m", "variance_m2", "mean_along_m", "variance_along_m2", "quantile", "reach_m"):
-        require_finite(f"along.{name}", getattr(along, name))
-    if along.approach_m is not None:
-        require_finite("along.approach_m", along.approach_m)
+    for name, value in vars(along).items():
+        if value is not None:
+            require_finite(f"along.{name}", value)
     raise ValueError(
         "encoder_sigma_rad, or a sum of the other values, is not finite; valid: finite values in metres and radians"
     )

@@ -7,12 +7,14 @@ the motion, so they only shorten the contact distances (docs/feel.md).
 import math
 from typing import Final, NamedTuple
 
-from common.arrays import BoolArray, FloatArray
+from common.arrays import BoolArray, FloatArray, IntArray
 from robot_side.arm.port import CLUSTER
-from robot_side.compiled.kernel import FLOAT64, inlined, tuple_type
+from robot_side.compiled.kernel import FLOAT64, building_block, inlined, tuple_type
 from robot_side.compiled.vectors import Vector, add, cross, dot, load, norm, scale, subtract
 from robot_side.enlargement.distance import statistical_distance
-from robot_side.field.scratch import Error, ScratchColumns
+from robot_side.field.scratch import SCRATCH, Error, ScratchColumns
+
+scratch_at = SCRATCH.at
 
 Spread = tuple[float, Vector, Vector, Vector]
 """Quadratic form in a point's position (x, y, z) from the tool: the constant; the factors of x, y and z; those of x²,
@@ -55,62 +57,29 @@ class DirectionalErrors(NamedTuple):
     mean: float
     """Mean error of arm and camera along û: û·(μ_ee - μ_c) in m"""
     variance: float
-    """Variance of the camera's error: σ_c² in m²"""
+    """Variance of an object's perceived position: σ_c² in m²"""
     mean_along: float
     """Mean prediction error: μ_δ in m"""
     variance_along: float
     """Variance of the prediction error: σ_δ² in m²"""
     quantile: float
     """Standard normal quantile: Φ⁻¹(P)"""
+    unseen: float
+    """Distance in m by which an object may have moved unseen: it adds to inflation and D_σ"""
+
+
+@inlined
+def own_errors(errors: DirectionalErrors, unseen: float, variance: float) -> DirectionalErrors:
+    """Return the errors with the unseen motion and the variance of one object."""
+    return DirectionalErrors(errors.mean, variance, errors.mean_along, errors.variance_along, errors.quantile, unseen)
 
 
 @inlined
 def inflation_and_distance(missed: DirectionalErrors, kinematic: float) -> tuple[float, float]:
     """Return the inflation I and D_σ (both in m) at a point. kinematic: the point's variance (m²) from the encoders."""
-    both = kinematic + missed.variance
-    inflation = statistical_distance(missed.mean, both, missed.quantile)
-    return inflation, statistical_distance(
-        missed.mean + missed.mean_along, both + missed.variance_along, missed.quantile
-    )
-
-
-@inlined
-def inflate(
-    centers: FloatArray,
-    radii: FloatArray,
-    on_finger: BoolArray,
-    tool: Vector,
-    jacobian: FloatArray,
-    encoder_variance: FloatArray,
-    along: Vector,
-    missed: DirectionalErrors,
-    scratch: ScratchColumns,
-) -> bool:
-    """Fill the scratch's spheres, inflations, D_σ, errors and clusters. Return False for numbers that are not finite.
-
-    centers (m, 3), radii (m,), on_finger (m,).
-    """
-    spheres, errors, check = scratch.spheres, scratch.along_m, missed.mean + missed.mean_along
-    spread = spread_along(jacobian, encoder_variance, along)
-    errors[:] = 0.0
-    check += missed.variance + missed.variance_along + missed.quantile
-    errors[Error.EXPECTED] = max(0.0, missed.mean + missed.mean_along)
-    for i in range(radii.size):
-        arm = subtract(load(centers, i), tool)
-        kinematic = variance_at(spread, arm)
-        inflation, whole = inflation_and_distance(missed, kinematic)
-        spheres[i, 0], spheres[i, 1], spheres[i, 2], spheres[i, 3] = *load(centers, i), radii[i]
-        scratch.inflation_m[i, 0], scratch.sigma_m[i, 0] = inflation, whole
-        scratch.on_finger[i] = on_finger[i]
-        errors[Error.LARGEST] = max(errors[Error.LARGEST], whole)
-        errors[Error.ALONG] = max(errors[Error.ALONG], whole - inflation)
-        # max() may hide NaN; the sum does not.
-        check += whole + inflation + kinematic + arm[0] + arm[1] + arm[2] + radii[i]
-    for first in range(0, radii.size, CLUSTER):
-        middle, radius = around_spheres(spheres, scratch.inflation_m, first, min(first + CLUSTER, radii.size))
-        cluster = scratch.clusters[first // CLUSTER]
-        cluster[0], cluster[1], cluster[2], cluster[3] = *middle, radius
-    return math.isfinite(check)
+    both, nearer = kinematic + missed.variance, missed.mean + missed.unseen
+    inflation = statistical_distance(nearer, both, missed.quantile)
+    return inflation, statistical_distance(nearer + missed.mean_along, both + missed.variance_along, missed.quantile)
 
 
 @inlined
@@ -128,5 +97,63 @@ def around_spheres(spheres: FloatArray, inflated: FloatArray, first: int, end: i
     return middle, radius
 
 
-ERRORS: Final = tuple_type(*(FLOAT64,) * 5, named=DirectionalErrors)
+@inlined
+def place_spheres(
+    centers: FloatArray,
+    radii: FloatArray,
+    on_finger: BoolArray,
+    tool: Vector,
+    jacobian: FloatArray,
+    encoder_variance: FloatArray,
+    along: Vector,
+    scratch: ScratchColumns,
+) -> bool:
+    """Fill the scratch's spheres and their variances from the encoders. Return False for numbers that are not finite.
+
+    centers (m, 3), radii (m,), on_finger (m,).
+    """
+    spheres, check = scratch.spheres, 0.0
+    spread = spread_along(jacobian, encoder_variance, along)
+    for i in range(radii.size):
+        arm = subtract(load(centers, i), tool)
+        kinematic = variance_at(spread, arm)
+        spheres[i, 0], spheres[i, 1], spheres[i, 2], spheres[i, 3] = *load(centers, i), radii[i]
+        scratch.kinematic_m2[i, 0], scratch.on_finger[i] = kinematic, on_finger[i]
+        check += kinematic + arm[0] + arm[1] + arm[2] + radii[i]
+    return math.isfinite(check)
+
+
+@building_block
+def inflate(missed: DirectionalErrors, scratch_bundle: IntArray, count: int) -> bool:
+    """Fill inflations, D_σ, errors and clusters of the scratch's first `count` spheres.
+
+    Return False for numbers that are not finite.
+    """
+    scratch = scratch_at(scratch_bundle)
+    errors, expected = scratch.along_m, missed.mean + missed.mean_along
+    check = expected + missed.variance + missed.variance_along + missed.quantile + missed.unseen
+    errors[:] = 0.0
+    errors[Error.EXPECTED] = max(0.0, expected)
+    for i in range(count):
+        inflation, whole = inflation_and_distance(missed, scratch.kinematic_m2[i, 0])
+        scratch.inflation_m[i, 0], scratch.sigma_m[i, 0] = inflation, whole
+        errors[Error.LARGEST] = max(errors[Error.LARGEST], whole)
+        errors[Error.ALONG] = max(errors[Error.ALONG], whole - inflation)
+        # max() may hide NaN; the sum does not.
+        check += whole + inflation
+    for first in range(0, count, CLUSTER):
+        middle, radius = around_spheres(scratch.spheres, scratch.inflation_m, first, min(first + CLUSTER, count))
+        cluster = scratch.clusters[first // CLUSTER]
+        cluster[0], cluster[1], cluster[2], cluster[3] = *middle, radius
+    return math.isfinite(check)
+
+
+@inlined
+def most_along(missed: DirectionalErrors) -> float:
+    """Return an upper bound of D_σ - I in m, whatever the variances of camera and encoders."""
+    # The root of a sum rises by at most the root of what is added.
+    return max(0.0, missed.mean_along + max(missed.quantile, 0.0) * math.sqrt(missed.variance_along))
+
+
+ERRORS: Final = tuple_type(*(FLOAT64,) * 6, named=DirectionalErrors)
 """Numba type of `DirectionalErrors`"""

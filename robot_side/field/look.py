@@ -23,7 +23,15 @@ from robot_side.compiled.kernel import (
     input_indices,
 )
 from robot_side.compiled.vectors import Vector, load
-from robot_side.field.inflation import ERRORS, DirectionalErrors, around_spheres, inflate
+from robot_side.field.inflation import (
+    ERRORS,
+    DirectionalErrors,
+    around_spheres,
+    inflate,
+    most_along,
+    own_errors,
+    place_spheres,
+)
 from robot_side.field.nearest_first import drop_first, push
 from robot_side.field.object_class import SKIPPED
 from robot_side.field.pairs import enter, pairs_of
@@ -193,9 +201,53 @@ def _key(bound: float, lead: float, rough: bool) -> float:
     return bound - lead if bound > 0.0 or rough else -math.inf
 
 
+@building_block
+def _queue_objects(
+    bundles: Bundles,
+    classes: IntArray,
+    approach: FloatArray,
+    along: Vector,
+    middle: Vector,
+    size: float,
+    shorter: float,
+    reach: float,
+) -> int:
+    """Queue the objects within reach, with lower bounds of their contact distances; return their number.
+
+    middle, size: sphere around the inflated gripper. shorter: upper bound of what shortens all contact distances.
+    """
+    scene, scratch = scene_at(bundles.scene), scratch_at(bundles.scratch)
+    count, place, farthest, moves = 0, -1, reach + MARGIN_M + shorter, approach.size > 0
+    for thing in range(approach.size):
+        farthest = max(farthest, reach + MARGIN_M + shorter + approach[thing])
+    while True:
+        place = next_object(scene, place + 1, middle, along, farthest, size)
+        if place >= scene.object_order.size:
+            return count
+        thing = scene.object_order[place]
+        if classes[thing] != SKIPPED:
+            first, end, lead = scene.first_rows[thing], scene.first_rows[thing + 1], shorter
+            lead += approach[thing] if moves else 0.0
+            rows, nearest = _near_rows(bundles, first, end, middle, size, along, reach + MARGIN_M + lead)
+            if rows > 0:
+                key = nearest - lead if nearest > 0.0 else -math.inf
+                count = push(scratch.bounds_m, scratch.objects, count, key, thing)
+
+
+@inlined
+def _list_distances(scratch: ScratchColumns, reach: float) -> None:
+    """Make each list of onset distances ascend: weaker strengths begin no later than stronger ones."""
+    for kind in range(2):
+        soonest = math.inf
+        for level in range(STRENGTHS - 1, -1, -1):
+            # Beyond the reach not all objects are known.
+            soonest = min(soonest, scratch.distances_m[kind, level])
+            scratch.distances_m[kind, level] = soonest if soonest <= reach else math.inf
+
+
 @compiled(
     *(input_array(2), input_array(1), input_flags(), input_array(1), input_array(2), input_array(1), input_array(1)),
-    *(ERRORS, FLOAT64, FLOAT64, input_indices(), input_array(1), BUNDLE, BUNDLE),
+    *(ERRORS, FLOAT64, FLOAT64, input_indices(), input_array(1), input_array(2), BUNDLE, BUNDLE),
     returns=BOOL,
 )
 def look(
@@ -211,6 +263,7 @@ def look(
     reach: float,
     classes: IntArray,
     approach: FloatArray,
+    of_objects: FloatArray,
     scene_bundle: IntArray,
     scratch_bundle: IntArray,
 ) -> bool:
@@ -220,48 +273,38 @@ def look(
     encoder_variance (n,): σ_θ². direction (3,): the unit vector û. half_gap: half the gap between the fingers, the
     largest inflation of a finger's sphere towards the target (§3.4). reach: distance examined. classes (k,): the
     objects' (`object_class`). approach (k,): distance by which each object approaches, subtracted from its contact
-    distances; empty if all are at rest.
+    distances; empty if all are at rest. errors: the largest of all objects. of_objects (k, 2): the unseen motion and
+    the variance of each, in place of those in `errors`; empty if all are alike.
     """
     bundles, scene, scratch = Bundles(scene_bundle, scratch_bundle), scene_at(scene_bundle), scratch_at(scratch_bundle)
     along, margin, spheres = load(direction.reshape(1, 3), 0), MARGIN_M, radii.size
     scratch.distances_m[:], scratch.counts[:] = math.inf, 0
-    origin = load(tool.reshape(1, 3), 0)
-    finite = inflate(centers, radii, on_finger, origin, jacobian, encoder_variance, along, errors, scratch)
-    if not (finite and math.isfinite(reach)):
+    finite = place_spheres(
+        centers, radii, on_finger, load(tool.reshape(1, 3), 0), jacobian, encoder_variance, along, scratch
+    )
+    if not (inflate(errors, scratch_bundle, spheres) and finite and math.isfinite(reach + approach.sum())):
         return False
     middle, size = around_spheres(scratch.spheres, scratch.inflation_m, 0, spheres)
-    shorter = scratch.along_m[Error.ALONG]
-    count, place, farthest, keys, things = 0, -1, reach + margin + shorter, scratch.bounds_m, scratch.objects
-    moves = approach.size > 0
-    for thing in range(approach.size):
-        if not math.isfinite(approach[thing]):
-            return False
-        farthest = max(farthest, reach + margin + shorter + approach[thing])
-    while True:
-        place = next_object(scene, place + 1, middle, along, farthest, size)
-        if place >= scene.object_order.size:
-            break
-        thing = scene.object_order[place]
-        if classes[thing] != SKIPPED:
-            first, end, lead = scene.first_rows[thing], scene.first_rows[thing + 1], shorter
-            lead += approach[thing] if moves else 0.0
-            rows, nearest = _near_rows(bundles, first, end, middle, size, along, reach + margin + lead)
-            if rows > 0:
-                count = push(keys, things, count, nearest - lead if nearest > 0.0 else -math.inf, thing)
+    differ = of_objects.size > 0
+    shorter = most_along(errors) if differ else scratch.along_m[Error.ALONG]
+    count = _queue_objects(bundles, classes, approach, along, middle, size, shorter, reach)
+    keys, things, inflated = scratch.bounds_m, scratch.objects, errors
     while count > 0 and keys[0] < _last_to_count(scratch, margin) and _within_budget(scratch, 0):
         thing = things[0]
         count = drop_first(keys, things, count)
-        first, end, lead = scene.first_rows[thing], scene.first_rows[thing + 1], shorter
-        lead += approach[thing] if moves else 0.0
+        own = own_errors(errors, of_objects[thing, 0], of_objects[thing, 1]) if differ else errors
+        if own.unseen != inflated.unseen or own.variance != inflated.variance:
+            if not inflate(own, scratch_bundle, spheres):
+                return False
+            inflated, (middle, size) = own, around_spheres(scratch.spheres, scratch.inflation_m, 0, spheres)
+        first, end, lead = scene.first_rows[thing], scene.first_rows[thing + 1], scratch.along_m[Error.ALONG]
+        lead += approach[thing] if approach.size > 0 else 0.0
         rows, _ = _near_rows(bundles, first, end, middle, size, along, reach + margin + lead)
         _look_at(bundles, spheres, rows, thing, classes[thing], lead, along, half_gap, reach)
+    if differ:  # The result's D_σ are those of the largest errors.
+        inflate(errors, scratch_bundle, spheres)
     if not _within_budget(scratch, 0):
         # What was not looked at may be anywhere.
         scratch.counts[Count.CUT], scratch.distances_m[:] = 1, 0.0
-    for kind in range(2):
-        soonest = math.inf
-        for level in range(STRENGTHS - 1, -1, -1):
-            # Weaker strengths begin no later than stronger ones. Beyond the reach not all objects are known.
-            soonest = min(soonest, scratch.distances_m[kind, level])
-            scratch.distances_m[kind, level] = soonest if soonest <= reach else math.inf
+    _list_distances(scratch, reach)
     return True

@@ -86,6 +86,7 @@ class ScratchColumns(NamedTuple):
 
     spheres: FloatArray
     on_finger: BoolArray
+    kinematic_m2: FloatArray
     inflation_m: FloatArray
     sigma_m: FloatArray
     clusters: FloatArray
@@ -105,7 +106,7 @@ class ScratchColumns(NamedTuple):
 
 SCRATCH: Final = Declared(
     ScratchColumns,
-    *(rows(4), FLAGS, rows(1), rows(1), rows(4), NUMBERS, INDICES, records(PAIR), INDICES, NUMBERS, INDICES),
+    *(rows(4), FLAGS, rows(1), rows(1), rows(1), rows(4), NUMBERS, INDICES, records(PAIR), INDICES, NUMBERS, INDICES),
     *(records(ENTRY), rows(2), NUMBERS, rows(STRENGTHS), NUMBERS, INDICES),
 )
 
@@ -117,10 +118,12 @@ class Scratch:
         self.spheres: FloatArray = np.zeros((spheres, 4))
         """Centre and radius of each gripper sphere, in m"""
         self.on_finger: BoolArray = np.zeros(spheres, dtype=np.bool_)
+        self.kinematic_m2: FloatArray = np.zeros((spheres, 1))
+        """Variance of each sphere's position from the encoders, along the direction of the look"""
         self.inflation_m: FloatArray = np.zeros((spheres, 1))
-        """Inflation I of each sphere: errors of camera and arm at P"""
+        """Inflation I of each sphere towards the present object: errors of camera and arm at P"""
         self.sigma_m: FloatArray = np.zeros((spheres, 1))
-        """D_σ of each sphere at P: errors of camera, arm and prediction"""
+        """D_σ of each sphere towards the present object at P: errors of camera, arm and prediction"""
         self.clusters: FloatArray = np.zeros((spheres // CLUSTER + 1, 4))
         """Bounding sphere of each cluster of inflated spheres"""
         self.keys_m: FloatArray = np.zeros(2 * spheres + len(self.clusters))

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from common.arrays import FloatArray
+from robot_side.field.object_errors import alike
 from robot_side.field.shared_volume import shared_volume_m3
 from robot_side.laws.classes import Classes, classes_of
 from robot_side.laws.explanation import enlargements_m
@@ -39,7 +40,10 @@ class EnlargedGripper:
         return {int(thing): float(found_m3[thing]) for thing in np.flatnonzero(found_m3)}
 
     def overlap_m3(self, situation: Situation) -> float:
-        """Return the volume shared with all objects, along the trigger that leads: at rest R2."""
+        """Return the volume shared with all objects, along the trigger that leads: at rest R2.
+
+        Space within two objects counts once, unless the gripper is enlarged differently for them.
+        """
         return self._overlap_m3(R2 if _ahead_m_s(situation) >= 0.0 else L2, situation, np.empty(0))
 
     def _overlap_m3(self, side: int, situation: Situation, of_objects_m3: FloatArray) -> float:
@@ -52,10 +56,14 @@ class EnlargedGripper:
         # Commands under way from an operator who has echoed nothing are unknown: full speed is the worst case.
         if not situation.loop_age_known:
             under_way_m_s = max(under_way_m_s, found.able.full_speed_m_s)
-        sigmas_m, _ = enlargements_m(pose, along, inputs.encoder_sigma_rad)
         centers_m = pose.sphere_centers_m + under_way_m_s * situation.loop_age_s * along.direction
-        spheres = np.concatenate([centers_m, (pose.sphere_radii_m + sigmas_m)[:, None]], axis=1)
-        return shared_volume_m3(spheres, inputs.surroundings.see(objects), classes, of_objects_m3)
+        table, found_m3 = inputs.surroundings.see(objects), 0.0
+        for unseen_m, variance_m2, some in alike(along.of_objects, classes, self._assumed.uncertainty):
+            towards = replace(along, unseen_m=unseen_m, variance_m2=variance_m2)
+            sigmas_m, _ = enlargements_m(pose, towards, inputs.encoder_sigma_rad)
+            spheres = np.concatenate([centers_m, (pose.sphere_radii_m + sigmas_m)[:, None]], axis=1)
+            found_m3 += shared_volume_m3(spheres, table, some, of_objects_m3)
+        return found_m3
 
 
 def _ahead_m_s(situation: Situation) -> float:

@@ -37,12 +37,16 @@ class LawInputs:
     """Settings of the paper's own law"""
 
     def total_overlap_m3(
-        self, situation: Situation, inflated_m: float | FloatArray = 0.0, moved_m: FloatArray | None = None
+        self,
+        situation: Situation,
+        inflated_m: float | FloatArray = 0.0,
+        moved_m: FloatArray | None = None,
+        classes: IntArray | None = None,
     ) -> float:
         """Return Σ V_ij (eq. 11-12) over the gripper's spheres i and all things j but what is held.
 
         Space counts once for each sphere that covers it. inflated_m: growth of every radius, or (m,) of each. moved_m
-        (3,): displacement of the gripper in the world.
+        (3,): displacement of the gripper in the world. classes (k,): of the objects j; SKIPPED ones do not count.
         """
         # Imported here, as the law `swept` does without its kernel, which takes 1.5 s to compile.
         from robot_side.field.total_overlap import total_overlap_m3  # noqa: PLC0415
@@ -50,7 +54,8 @@ class LawInputs:
         pose = situation.pose
         centers_m = pose.sphere_centers_m if moved_m is None else pose.sphere_centers_m + moved_m
         spheres = np.concatenate([centers_m, (pose.sphere_radii_m + inflated_m)[:, None]], axis=1)
-        return total_overlap_m3(spheres, self.surroundings.see(situation.objects), everything_but_held(situation))
+        felt = everything_but_held(situation) if classes is None else classes
+        return total_overlap_m3(spheres, self.surroundings.see(situation.objects), felt)
 
     def nearest_m(self, situation: Situation, farthest_m: float = 0.2) -> float:
         """Return the distance from the gripper to the nearest thing, to a thousandth of `farthest_m`, at most that."""

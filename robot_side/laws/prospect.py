@@ -14,6 +14,7 @@ from robot_side.arm.port import GripperPose
 from robot_side.arm.tool_motion import ToolMotionSettings
 from robot_side.enlargement.distance import Uncertainty
 from robot_side.field.along import Along
+from robot_side.field.object_errors import largest_errors, object_errors
 from robot_side.laws.law import MOST_M
 from robot_side.laws.path import Waypoint, at_waypoint
 from robot_side.tick.sensed import R2, STICK
@@ -116,13 +117,17 @@ def _along(
     if velocities_m_s is not None and velocities_m_s.any():
         closing_m_s = np.maximum(-(velocities_m_s @ direction), 0.0)
         approach_m = np.minimum(closing_m_s * stopping_s(able, age_s), MOST_M)
+    of_objects = object_errors(situation.objects, uncertainty)
+    unseen_m, variance_m2 = largest_errors(of_objects, uncertainty)
     return Along(
         direction=direction,
         mean_m=uncertainty.mean_along_m(direction),
-        variance_m2=uncertainty.camera_sd_m**2,
+        variance_m2=variance_m2,
         quantile=uncertainty.quantile,
         reach_m=reach_m,
         mean_along_m=mean_m,
         variance_along_m2=sd_m * sd_m,
         approach_m=approach_m,
+        unseen_m=unseen_m,
+        of_objects=of_objects,
     )

@@ -9,11 +9,14 @@ import numpy as np
 
 from common.arrays import BoolArray, FloatArray, IntArray
 from common.reaction import HORIZON_S
+from robot_side.enlargement.distance import Uncertainty
 from robot_side.field.look import MARGIN_M
 from robot_side.field.object_class import SKIPPED
+from robot_side.field.object_errors import largest_errors, object_errors
 from robot_side.laws.gripper_motion import GripperMotion
 from robot_side.laws.prospect import BETWEEN_S, BEYOND_M, Assumed
 from robot_side.surroundings.blocks import TOGETHER
+from robot_side.surroundings.perceived import PerceivedObjects
 from robot_side.surroundings.scene_table import SceneTable
 from robot_side.tick.situation import Situation
 
@@ -44,12 +47,21 @@ def farthest_m(situation: Situation, motion: GripperMotion, assumed: Assumed, en
     missed = assumed.uncertainty
     mean_m, sd_m = missed.prediction.at(situation.compensation, age_s, full_speed_m_s)
     late_m = abs(situation.astray_m_s) * (age_s + change_s) + situation.later_s * full_speed_m_s
-    mean_m = abs(mean_m) + math.hypot(*missed.mean_m) + late_m
-    sd_m = math.hypot(_length(encoder_sigma_rad * per_rad_m), missed.camera_sd_m, sd_m)
+    unseen_m, variance_m2 = largest_errors(object_errors(situation.objects, missed), missed)
+    mean_m = unseen_m + abs(mean_m) + math.hypot(*missed.mean_m) + late_m
+    sd_m = math.hypot(_length(encoder_sigma_rad * per_rad_m), math.sqrt(variance_m2), sd_m)
     # Twice: errors inflate the spheres, and those along the motion shorten the way.
     errors_m = 2.0 * (mean_m + abs(missed.quantile) * sd_m)
     radius_m = float(pose.sphere_radii_m.max(initial=0.0))
     return levers_m + radius_m + max(path_m, to_probe_m) + by_trigger_m + MARGIN_M + errors_m
+
+
+def misplaced_m(objects: PerceivedObjects, uncertainty: Uncertainty) -> float:
+    """Return a distance by which objects may be nearer than they are perceived: errors of camera and kinematics."""
+    unseen_m, variance_m2 = largest_errors(object_errors(objects, uncertainty), uncertainty)
+    return (
+        float(np.linalg.norm(uncertainty.mean_m)) + unseen_m + max(uncertainty.quantile, 0.0) * math.sqrt(variance_m2)
+    )
 
 
 def nothing_within(scene: SceneTable, classes: IntArray, center_m: FloatArray, reach_m: float) -> bool:

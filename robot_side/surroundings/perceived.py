@@ -73,6 +73,13 @@ class PerceivedObjects:
     """(k, 3, 3) rotation from each object's own frame to the world frame; None if unknown"""
     velocities_m_s: FloatArray | None = field(default_factory=lambda: None)
     """(k, 3) velocity of each object in the world frame. None if not measured; objects then count as at rest."""
+    sds_m: FloatArray | None = field(default_factory=lambda: None)
+    """(k,) standard deviation σ_c of each object's position along each axis; NaN: that of the settings. None: for all.
+    """
+    unseen_m: float = 0.0
+    """Distance by which each object may have moved since it was seen, in any direction"""
+    late_s: float = 0.0
+    """Time by which moving objects may be ahead of or behind their positions, as the frame's age is not known well"""
     since: "tuple[SomeObjects, FloatArray] | None" = field(default=None, init=False, repr=False)
     """Movers that made this frame, and their numbers; None if any object may have moved"""
 

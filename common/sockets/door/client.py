@@ -239,6 +239,8 @@ class Door:
     def _await(self, condition: Callable[[], bool]) -> None:
         while not condition():
             self.wait(SILENT_S)
+            # While a program's message waits, `wait` takes nothing from the door.
+            self.update()
             if self._failure is not None:
                 raise ConfigurationError(self._failure)
 

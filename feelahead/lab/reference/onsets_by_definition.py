@@ -7,7 +7,7 @@ Takes only inputs and constants from the compiled field. Passes over a sphere an
 alone proves that they shorten no contact distance.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -103,12 +103,15 @@ class _Pairs(NamedTuple):
 
 
 def statistical_m(pose: GripperPose, along: Along, encoder_sigma_rad: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the inflation (m,) of each sphere, and D_σ of each along û: eq. 5, 9 and 10."""
+    """Return inflation and D_σ along û, each (m, k) of a sphere towards each object, or (m, 1): eq. 5, 9 and 10."""
     leaning = np.einsum("a,man->mn", along.direction, pose.sphere_jacobians)
-    variance = leaning**2 @ encoder_sigma_rad**2 + along.variance_m2
-    inflated_m = np.maximum(0.0, along.mean_m + along.quantile * np.sqrt(variance))
+    kinematic_m2: FloatArray = leaning**2 @ encoder_sigma_rad**2
+    own = np.array([[along.unseen_m, along.variance_m2]]) if along.of_objects is None else along.of_objects
+    nearer_m = along.mean_m + own[:, 0]
+    variance = kinematic_m2[:, None] + own[:, 1]
+    inflated_m = np.maximum(0.0, nearer_m + along.quantile * np.sqrt(variance))
     spread = np.sqrt(variance + along.variance_along_m2)
-    return inflated_m, np.maximum(0.0, along.mean_m + along.mean_along_m + along.quantile * spread)
+    return inflated_m, np.maximum(0.0, nearer_m + along.mean_along_m + along.quantile * spread)
 
 
 def defined_onsets(
@@ -120,19 +123,22 @@ def defined_onsets(
     encoder_sigma_rad: FloatArray,
 ) -> Defined:
     """Compute the result that `Ahead.look` should have for the same arguments."""
-    alone_m, sigma_m = statistical_m(pose, along, encoder_sigma_rad)
-    along_m, expected_m = max(0.0, (sigma_m - alone_m).max()), max(0.0, along.mean_m + along.mean_along_m)
+    of_spheres_m = statistical_m(pose, along, encoder_sigma_rad)
+    towards = len(pose.sphere_radii_m), len(classes)
+    alone_m, sigma_m = (np.broadcast_to(of_m, towards) for of_m in of_spheres_m)
+    along_m, expected_m = np.maximum(0.0, (sigma_m - alone_m).max(axis=0)), max(0.0, along.mean_m + along.mean_along_m)
     solids = Solids(objects)
-    sphere, thing = np.nonzero(np.broadcast_to(classes != SKIPPED, (len(sigma_m), len(classes))))
+    sphere, thing = np.nonzero(np.broadcast_to(classes != SKIPPED, towards))
     held_back = pose.sphere_on_finger[sphere] & (classes[thing] == TARGET)
-    inflated_m = np.where(held_back, np.minimum(alone_m[sphere], widest_m), alone_m[sphere])
-    approach_m = along_m + (np.zeros(len(thing)) if along.approach_m is None else along.approach_m[thing])
+    swollen_m = alone_m[sphere, thing]
+    inflated_m = np.where(held_back, np.minimum(swollen_m, widest_m), swollen_m)
+    approach_m = along_m[thing] + (np.zeros(len(thing)) if along.approach_m is None else along.approach_m[thing])
     swollen = _Pairs(
         centers_m=pose.sphere_centers_m[sphere],
         radii_m=pose.sphere_radii_m[sphere] + inflated_m,
         thing=thing,
         sooner_m=approach_m,
-        later_m=np.maximum(inflated_m + along_m - expected_m, 0.0),
+        later_m=np.maximum(inflated_m + along_m[thing] - expected_m, 0.0),
         touchable=np.isin(classes[thing], (TOUCHABLE, TARGET)),
         bound_m=np.zeros(len(thing)),
         before_m3=np.zeros(len(thing)),
@@ -146,7 +152,8 @@ def defined_onsets(
     bare = bare._replace(radii_m=bare.radii_m - inflated_m[inside], sooner_m=bare.sooner_m + inflated_m[inside])
     bare, _ = look.bounded(bare)
     look.follow(near.and_also(bare))
-    return Defined(look.onsets_m, float(sigma_m.max(initial=0.0)), look.things)
+    _, largest_m = statistical_m(pose, replace(along, of_objects=None), encoder_sigma_rad)
+    return Defined(look.onsets_m, float(largest_m.max(initial=0.0)), look.things)
 
 
 class _Look:

@@ -66,6 +66,9 @@ def compared(kinds: tuple[str, ...], scenes: range, spheres: int) -> FloatArray:
             variance_along_m2=rng.uniform(0.0, 0.002) ** 2,
             approach_m=rng.uniform(0.0, 0.02, things) if seed % 2 else None,
         )
+        if seed % 3 == 0:
+            own = np.stack([rng.uniform(0.0, 0.01, things), rng.uniform(0.0, 0.006, things) ** 2], axis=1)
+            looked = replace(looked, of_objects=own, unseen_m=own[:, 0].max(), variance_m2=own[:, 1].max())
         pose = free_pose(centers_m, radii_m, rng.random(count) < 0.5)
         classes = rng.choice([OBSTACLE, OBSTACLE, TOUCHABLE, TARGET], things).tolist()
         widest_m = float(rng.choice([0.002, 0.01, np.inf]))
