@@ -36,7 +36,7 @@ from robot_side.drivers.mujoco.viewpoints import stick_frames
 from robot_side.drivers.remote.arm import RemoteArm
 from robot_side.drivers.remote.connected_drivers import ConnectedDrivers
 from robot_side.drivers.remote.driver_session import ArmShape
-from robot_side.drivers.remote.frame_message import perceived
+from robot_side.drivers.remote.frame_build import perceived
 from robot_side.gripper.held_covers import HeldCovers
 from robot_side.gripper.kept_covers import SearchNotes
 from robot_side.laws.enlarged_gripper import EnlargedGripper
@@ -117,11 +117,12 @@ def build_parts(
     searching = None if announce is None else SearchNotes(announce)
     kinematics = MujocoKinematics(scene, settings.cover_m, searching)
     camera = _camera(settings, scene, int(camera_noise))
-    seen_elsewhere = None if drivers is None else drivers.objects(settings.roles, settings.camera.sd_m)
+    surroundings = Surroundings()
+    unseen_m_s = settings.camera.unseen_m_s
+    seen_elsewhere = None if drivers is None else drivers.objects(settings.roles, unseen_m_s, surroundings.see)
     # Before the first tick, as a search for spheres takes far longer than one.
     first = as_loaded(scene, scene.roles) if settings.objects is None else perceived([], [], 0.0)
     held_covers = HeldCovers(first, settings.cover_m, scene.never_held, searching)
-    surroundings = Surroundings()
     prediction, prediction_note = settings.prediction_for(scene.robot.fingerprint)
     errors = settings.uncertainty(prediction)
     encoder_sigma_rad = np.full(arm.joint_count, encoder.standard_deviation_rad())

@@ -54,6 +54,9 @@ class CameraSettings:
     """Standard deviation of an error drawn once for each object; 3 mm is assumed for a depth camera at half a metre."""
     frame_sd_m: _Spread = 0.0
     """Standard deviation of an additional error, drawn anew in each frame."""
+    unseen_m_s: Annotated[float, Meta(ge=0.0, le=10.0)] = 0.02
+    """With --objects: speed at which anything may move without being seen to; the enlargement grows by it with the age
+    of the newest frame."""
 
     def __post_init__(self) -> None:
         check_limits(self)

@@ -14,7 +14,7 @@ import zmq
 socket = zmq.Context().socket(zmq.DEALER)
 socket.setsockopt(zmq.SNDHWM, 2)
 socket.connect(sys.argv[1] if len(sys.argv) > 1 else "tcp://127.0.0.1:5602")
-sequence = 0
+sequence, next_s, echo = 0, time.monotonic(), (None, 0.0)
 while True:
     sequence, now_s = sequence + 1, time.monotonic()
     side_m, speed_m_s = 0.1 * math.sin(now_s), 0.1 * math.cos(now_s)
@@ -22,8 +22,14 @@ while True:
     target = {"name": "target", "box": [0.02, 0.02, 0.05], "position_m": [0.6, 0.0, 0.05], "sd_m": 0.003}
     ball = {"name": "ball", "sphere": 0.03, "position_m": [0.5, side_m, 0.2], "velocity_m_s": [0.0, speed_m_s, 0.0]}
     frame = {"version": 1, "sequence": sequence, "sent_s": now_s, "taken_s": now_s, "objects": [table, target, ball]}
+    echo_s, read_s = echo
+    frame |= {"echo_s": echo_s, "held_s": 0.0 if echo_s is None else now_s - read_s}
     with contextlib.suppress(zmq.Again):  # no robot side yet
         socket.send(msgpack.packb(frame), zmq.NOBLOCK)
-    while socket.poll(0):
-        print("refused:", msgpack.unpackb(socket.recv())["refused"], flush=True)
-    time.sleep(1 / 30)
+    next_s = max(next_s + 1 / 30, now_s)
+    while socket.poll(1e3 * max(next_s - time.monotonic(), 0.0)):  # an answer's time of reading bounds the frames' age
+        answer, read_s = msgpack.unpackb(socket.recv()), time.monotonic()
+        if "refused" in answer:
+            print("refused:", answer["refused"], flush=True)
+        else:
+            echo = answer["sent_s"], read_s

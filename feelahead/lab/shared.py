@@ -15,7 +15,8 @@ from feelahead.lab.posed_gripper import PosedGripper
 from feelahead.lab.reference.voxels import voxel_volume_m3
 from feelahead.lab.table import Row
 from robot_side.drivers.mujoco.scene import load_scene
-from robot_side.drivers.remote.frame_message import SeenObject, perceived
+from robot_side.drivers.remote.frame_build import perceived
+from robot_side.drivers.remote.frame_message import SeenObject
 from robot_side.field.along import Along
 from robot_side.field.field import Ahead
 from robot_side.field.shared_volume import shared_volume_m3

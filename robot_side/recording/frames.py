@@ -1,9 +1,12 @@
 """Encoding and decoding of recorded frames of perceived objects.
 
-    frame   time f64, whole u8, then for each array of ARRAYS: tag u8, rows u32, and by the tag
+    frame   time f64, flags u8 (1: whole, 2: errors, 4: meshes), then for each array of ARRAYS: tag u8, rows u32, and
+            by the tag
               0   nothing: same as in the frame before   1   rows x width values
               2   count u32, count row numbers u32, count x width values: these rows, the others as before
               3   nothing: the array is None
+            errors, if flagged: sds_m as such an array, unseen_m f64, late_s f64
+            meshes, if flagged: length u32 and MessagePack: vertices and triangles of each mesh that was sent
             names: length u32 and MessagePack, in whole frames only; roles: one u8 an object
 
 Values are float64 or int64, bit for bit as the core got them.
@@ -12,13 +15,16 @@ Values are float64 or int64, bit for bit as the core got them.
 import math
 import struct
 from collections.abc import Mapping
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import msgspec
 import numpy as np
 
 from common.roles import Role
 from robot_side.surroundings.perceived import KINDS, PerceivedObjects
+
+if TYPE_CHECKING:
+    from robot_side.overlap.meshes.mesh_library import MeshLibrary
 
 ARRAYS: Final[Mapping[str, tuple[type, tuple[int, ...]]]] = {
     name: described
@@ -30,7 +36,10 @@ ARRAYS: Final[Mapping[str, tuple[type, tuple[int, ...]]]] = {
 } | {"velocities_m_s": (np.float64, (3,))}
 """Arrays of a frame in their order, with the type of their values and the shape of a row"""
 _SAME, _WHOLE, _ROWS, _NONE = range(4)
+_IS_WHOLE, _HAS_ERRORS, _HAS_MESHES = 1, 2, 4
 _FRAME: Final = struct.Struct("<dB")
+_UNSEEN: Final = struct.Struct("<dd")
+_LENGTH: Final = struct.Struct("<I")
 _ARRAY: Final = struct.Struct("<BI")
 _ROLES: Final = tuple(Role)
 
@@ -50,12 +59,20 @@ class FramePacker:
         last, self._last = self._last, frame
         if last is not None and last.names is not frame.names and last.names != frame.names:
             last = None
-        parts = [_FRAME.pack(frame.time_s, last is None)]
+        sources = () if frame.mesh_library is None else frame.mesh_library.sources
+        if last is not None and last.mesh_library is frame.mesh_library:
+            sources = ()
+        errs = frame.sds_m is not None or frame.unseen_m > 0.0 or frame.late_s > 0.0
+        flags = (last is None) * _IS_WHOLE | errs * _HAS_ERRORS | bool(sources) * _HAS_MESHES
+        parts = [_FRAME.pack(frame.time_s, flags)]
         for name in ARRAYS:
             parts += _packed(getattr(frame, name), None if last is None else getattr(last, name))
-        if last is None:
-            names = msgspec.msgpack.encode(frame.names)
-            parts += [struct.pack("<I", len(names)), names]
+        if errs:
+            parts += _packed(frame.sds_m, None if last is None else last.sds_m)
+            parts.append(_UNSEEN.pack(frame.unseen_m, frame.late_s))
+        for content in ([sources] if sources else []) + ([frame.names] if last is None else []):
+            packed = msgspec.msgpack.encode(content)
+            parts += [_LENGTH.pack(len(packed)), packed]
         parts.append(bytes(_ROLES.index(role) for role in frame.roles))
         return b"".join(parts)
 
@@ -82,16 +99,17 @@ class FrameUnpacker:
     """Decoder of frames from their changes."""
 
     def __init__(self, scene: PerceivedObjects) -> None:
-        """scene: any frame of the same scene; it has the shapes of meshes, which do not change and are not recorded.
+        """scene: any frame of the same scene; it has the shapes of the model's meshes, which are not recorded.
 
-        Frames without meshes may have other objects.
+        Frames without these may have other objects.
         """
         self._scene = scene
         self._last: PerceivedObjects | None = None
 
     def unpack(self, content: bytes) -> PerceivedObjects:
         """Decode a frame; ValueError or struct.error for invalid content, or for changes without the frame before."""
-        time_s, whole = _FRAME.unpack_from(content)
+        time_s, flags = _FRAME.unpack_from(content)
+        whole = flags & _IS_WHOLE
         if not whole and self._last is None:
             raise ValueError("the frame holds only changes, but no complete frame came before it")
         last, position = None if whole else self._last, _FRAME.size
@@ -100,21 +118,41 @@ class FrameUnpacker:
             arrays[name], position = _unpacked(
                 content, position, kind, shape, None if last is None else getattr(last, name)
             )
-        if last is None:
-            (length,) = struct.unpack_from("<I", content, position)
-            position += 4 + length
-            names = msgspec.msgpack.decode(content[position - length : position], type=tuple[str, ...])
-        else:
-            names = last.names
-        others = names != self._scene.names
-        if others and len(arrays["mesh_index"]):
-            raise ValueError("the frame has other objects than the scene")
+        if flags & _HAS_ERRORS:
+            before = None if last is None else last.sds_m
+            arrays["sds_m"], position = _unpacked(content, position, np.float64, (), before)
+            arrays["unseen_m"], arrays["late_s"] = _UNSEEN.unpack_from(content, position)
+            position += _UNSEEN.size
+        library = None if last is None else last.mesh_library
+        if flags & _HAS_MESHES:
+            sources, position = _content(content, position, tuple[tuple[bytes, bytes], ...])
+            library = _library(sources)
+        names, position = (last.names, position) if last is not None else _content(content, position, tuple[str, ...])
+        if library is None:
+            others = names != self._scene.names
+            if others and len(arrays["mesh_index"]):
+                raise ValueError("the frame has other objects than the scene")
+            library = None if others else self._scene.mesh_library
         roles = tuple(_ROLES[role] for role in content[position:])
         if len(roles) != len(names):
             raise ValueError(f"the frame has {len(roles)} roles; valid: one for each of {len(names)} objects")
-        library = None if others else self._scene.mesh_library
         self._last = PerceivedObjects(time_s=time_s, names=names, roles=roles, mesh_library=library, **arrays)
         return self._last
+
+
+def _content(content: bytes, position: int, kind: Any) -> tuple[Any, int]:
+    """Return what MessagePack of a given length holds, and the position after it."""
+    (length,) = _LENGTH.unpack_from(content, position)
+    begin = position + _LENGTH.size
+    return msgspec.msgpack.decode(content[begin : begin + length], type=kind), begin + length
+
+
+def _library(sources: Any) -> "MeshLibrary":
+    # A recording without sent meshes does not load the kernels for them.
+    from robot_side.overlap.meshes.mesh_library import MeshLibrary, Source  # noqa: PLC0415
+
+    known = tuple(Source(*source) for source in sources)
+    return MeshLibrary([source.mesh() for source in known], known)
 
 
 def _unpacked(content: bytes, position: int, kind: type, shape: tuple[int, ...], last: Any) -> tuple[Any, int]:

@@ -22,6 +22,16 @@ OF_OBJECTS: Final = {"positions_m": (3,), "rotations": (3, 3), "velocities_m_s":
 """Arrays of a frame that have a row for each object, and the shape of a row, in the order of an object's numbers"""
 
 
+_POINTS: Final = (
+    "sphere_centers_m",
+    "box_centers_m",
+    "tetrahedron_vertices_m",
+    "mesh_positions_m",
+    "ellipsoid_centers_m",
+)
+"""Arrays of a frame that hold points"""
+
+
 class Part(NamedTuple):
     """Where the values of one array of a frame are among the movers' numbers."""
 
@@ -55,7 +65,7 @@ class Movers:
         """(n,) indices of the movers' primitives among all primitives of the frame"""
         self.first_rows = np.searchsorted(owners[self._own], np.append(things, len(first.names)))
         self.parts = self._all_parts(kinds[self._own], rows_of_kind[self._own])
-        made_whole = {*self.parts, "time_s", "roles", "since"}
+        made_whole = {*self.parts, "time_s", "roles", "since", "unseen_m", "late_s"}
         self._still = {name: value for name, value in vars(first).items() if name not in made_whole}
 
     def _all_parts(self, kinds: IntArray, rows_of_kind: IntArray) -> Mapping[str, Part]:
@@ -86,10 +96,31 @@ class Movers:
         """Numbers of the movers in `first`"""
         return self.numbers_in(self.first)
 
-    def frame(self, time_s: float, numbers: FloatArray, roles: tuple[Role, ...]) -> PerceivedObjects:
+    def displaced(self, by_m: FloatArray) -> FloatArray:
+        """Return the movers' numbers (n + m, 20) with each mover `by_m` (m, 3) from where it is in `first`."""
+        numbers, owners = self.at_first.copy(), np.repeat(np.arange(len(self.things)), np.diff(self.first_rows))
+        for name in _POINTS:
+            places, _, columns, _ = self.parts[name]
+            points = numbers[places, columns]
+            numbers[places, columns] = points + np.tile(by_m[owners[places]], points.shape[1] // 3)
+        places, _, columns, _ = self.parts["half_space_normals"]
+        along = (numbers[places, columns] * by_m[owners[places]]).sum(axis=1)
+        numbers[places, self.parts["half_space_offsets_m"].columns] += along[:, None]
+        numbers[len(owners) :, :3] += by_m
+        return numbers
+
+    def frame(
+        self,
+        time_s: float,
+        numbers: FloatArray,
+        roles: tuple[Role, ...],
+        unseen_m: float = 0.0,
+        late_s: float = 0.0,
+    ) -> PerceivedObjects:
         """Return a new frame: the movers have these numbers (n + m, 20), all other objects are as in the first frame.
 
-        roles: of all objects. ValueError for numbers of another shape or type, or for another number of roles.
+        roles: of all objects. unseen_m, late_s: as in a frame.
+        ValueError for numbers of another shape or type, or for another number of roles.
         """
         shape = len(self._own) + len(self.things), NUMBERS
         if numbers.shape != shape or numbers.dtype != np.float64 or not numbers.flags.c_contiguous:
@@ -99,7 +130,9 @@ class Movers:
             )
         if len(roles) != len(self.first.names):
             raise ValueError(f"roles holds {len(roles)} roles; valid: one for each of {len(self.first.names)} objects")
-        return _MoversFrame(**self._still, time_s=time_s, roles=roles, since=(self, numbers))
+        return _MoversFrame(
+            **self._still, time_s=time_s, roles=roles, since=(self, numbers), unseen_m=unseen_m, late_s=late_s
+        )
 
 
 class _MoversFrame(PerceivedObjects):

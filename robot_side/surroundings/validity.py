@@ -65,10 +65,28 @@ def require_valid(objects: PerceivedObjects) -> None:
                 f" of {len(objects.names)} objects"
             )
         require_finite("objects.velocities_m_s", velocities)
+    _require_valid_errors(objects)
     for name, _, check in _CHECKED:
         fault = _fault(getattr(objects, name), check)
         if fault is not None:
             raise ValueError(f"objects.{name}{fault}")
+
+
+def _require_valid_errors(objects: PerceivedObjects) -> None:
+    """Raise a ValueError unless the errors of the positions are valid; a standard deviation may be NaN."""
+    if (sds_m := objects.sds_m) is not None and (
+        sds_m.shape != (len(objects.names),)
+        or sds_m.dtype != np.float64
+        or (sds_m < 0.0).any()
+        or np.isinf(sds_m).any()
+    ):
+        raise ValueError(
+            f"objects.sds_m holds {_described(sds_m)}; valid: float64, 0 or more or NaN for each of"
+            f" {len(objects.names)} objects"
+        )
+    for name, value in (("unseen_m", objects.unseen_m), ("late_s", objects.late_s)):
+        if not 0.0 <= value < np.inf:
+            raise ValueError(f"objects.{name} = {value}; valid: a finite number, 0 or more")
 
 
 def _require_known_meshes(objects: PerceivedObjects) -> None:

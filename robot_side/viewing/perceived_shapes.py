@@ -27,8 +27,8 @@ class PerceivedModel(SceneModel):
         """Take a frame's objects; return whether the objects or their shapes differ from the last frame's."""
         if objects is self._frame:
             return False
-        arrays = [*(kind.owner for kind in KINDS), *_SIZES.values()]
-        known = objects.names, *(getattr(objects, name).tobytes() for name in arrays)
+        arrays = [*(kind.owner for kind in KINDS), *_SIZES.values(), "mesh_index"]
+        known = objects.names, objects.mesh_library, *(getattr(objects, name).tobytes() for name in arrays)
         self._frame = objects
         if known == self._known:
             return False
@@ -55,4 +55,11 @@ class PerceivedModel(SceneModel):
                 *(index, False, "mesh", (1.0, 1.0, 1.0), _IN_PLACE),
                 vertices_m=own.astype("<f4").tobytes(),
                 triangles=triangles.tobytes(),
+            )
+        placed = frame.mesh_index[frame.mesh_object == index]
+        for corners in [] if frame.mesh_library is None else [frame.mesh_library.corners_m[mesh] for mesh in placed]:
+            yield Shape(
+                *(index, False, "mesh", (1.0, 1.0, 1.0), _IN_PLACE),
+                vertices_m=corners.astype("<f4").tobytes(),
+                triangles=np.arange(3 * len(corners), dtype="<u4").tobytes(),
             )

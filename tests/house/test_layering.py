@@ -53,7 +53,8 @@ ARROWS = """
         robot_side/surroundings/kinds
     robot_side/gripper: common common/files robot_side/arm robot_side/overlap/meshes robot_side/surroundings
     robot_side/tick: common common/protocol robot_side/arm robot_side/surroundings
-    robot_side/drivers/remote: common common/sockets/door common/timing robot_side/arm robot_side/surroundings
+    robot_side/drivers/remote: common common/sockets/door common/timing robot_side/arm robot_side/overlap/meshes
+        robot_side/surroundings
     robot_side/laws: common common/files common/protocol robot_side/arm robot_side/enlargement robot_side/field
         robot_side/laws/paper_settings.py robot_side/surroundings robot_side/tick
     robot_side/drivers/mujoco: common common/files common/protocol robot_side/arm robot_side/compiled
@@ -63,7 +64,8 @@ ARROWS = """
         robot_side/arm
         robot_side/operators robot_side/tick
     robot_side/outcome: common robot_side/tick robot_side/tick/truth.py
-    robot_side/recording: common common/recording robot_side/arm robot_side/surroundings robot_side/tick
+    robot_side/recording: common common/recording robot_side/arm robot_side/overlap/meshes robot_side/surroundings
+        robot_side/tick
     robot_side/laws/named.py: common/files robot_side/laws robot_side/tick
     robot_side/laws/paper_settings.py:
     robot_side/drivers/mujoco/checks: common robot_side/arm robot_side/drivers/mujoco

@@ -34,6 +34,8 @@ _FIELDS: Final = ("mug", "u_mesh", "terrain_ahead")
 """Frozen scenes with concave objects ahead."""
 _MOST_FIELD_MS: Final = 0.3
 _LOOK: Final = "look to message"
+_SENT: Final = 500
+"""Number of objects that a process sends, in one frame or at 10 Hz"""
 
 
 @dataclass(frozen=True)
@@ -62,6 +64,8 @@ class Case:
     stages: bool = False
     objects: int = 0
     only: bool = False
+    sent: str = ""
+    """How the additional objects come as frames: once, or again at 10 Hz"""
 
 
 @dataclass(frozen=True)
@@ -73,7 +77,7 @@ class Concave:
 
 
 def cells(settings: TickSweep) -> Iterator[Case | Concave]:
-    """Yield the cells: the demo, an empty scene, each number of objects, and the concave objects."""
+    """Yield the cells: the demo, an empty scene, each number of objects, sent objects, and the concave objects."""
     seconds = _QUICK_S if settings.quick else settings.seconds
     yield Case("demo, each stage timed", seconds, stages=True)
     yield Case("demo", seconds)
@@ -81,6 +85,8 @@ def cells(settings: TickSweep) -> Iterator[Case | Concave]:
     counts = settings.objects
     for count in dict.fromkeys(counts[:1] + counts[-1:]) if settings.quick else counts:
         yield Case(f"{count} objects", seconds, objects=count)
+    for sent in ("once", "again"):
+        yield Case(f"{_SENT} objects sent {sent}", seconds, objects=_SENT, sent=sent)
     for name in _FIELDS:
         yield Concave(name, seconds / 2.0)
 
@@ -92,7 +98,7 @@ def run(cell: Case | Concave, seed: int) -> Iterator[Row]:
         for stage, spent_s in ((f"field of {cell.case}", looks_s), ("mixed", mixed_s)):
             yield {"stage": stage, "objects": 1, **as_ratios(spent_s, mixed_s)}
         return
-    names = ("stages", "objects", "only")
+    names = ("stages", "objects", "only", "sent")
     with tempfile.TemporaryDirectory() as folder:
         log, flags = Path(folder) / "ticks.npy", [f"--{name}={getattr(cell, name)}" for name in names]
         ours = [f"--log={log}", *flags, f"--seed={seed}", "--no-cameras"]

@@ -1,6 +1,7 @@
 """Robot side that logs the processor time of each tick: `python -m ... --log=FILE.npy` and the robot side's flags.
 
---objects=N adds N perceived objects without physics; --only removes the scene's own objects.
+--objects=N adds N perceived objects without physics; --only removes the scene's own objects. --sent=once and
+--sent=again perceive the N objects alone, as a process sends them: in one frame, or in frames at 10 Hz.
 
 The reference "mixed" (see `Mixed`) is measured in the same process, at the start of 4 of every 17 ticks; these ticks do
 not count. "mixed" and a tick both begin after the loop's sleep, with cold caches. (After a tick's messages "mixed" was
@@ -13,7 +14,7 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import Final, get_args
+from typing import Final, Literal, get_args
 
 import numpy as np
 import tyro
@@ -22,6 +23,7 @@ import robot_side.main
 from common.command.command_line import parse_settings, run_command
 from feelahead.lab.tick.crowd import CrowdedCamera
 from feelahead.lab.tick.mixed import Mixed
+from feelahead.lab.tick.sent_crowd import SentCamera
 from robot_side.core.robot_parts import RobotParts
 from robot_side.laws.law import Law
 from robot_side.tick.events import Listener, Step, Tick
@@ -60,6 +62,8 @@ class TimedSettings:
     """Measure each stage, which itself takes some microseconds; if False, only the stages outside "look to message"."""
     only: tyro.conf.FlagConversionOff[bool] = False
     """Leave out the scene's own objects, and perceive only the additional ones."""
+    sent: Literal["", "once", "again"] = ""
+    """How the additional objects come as frames, if they do."""
 
 
 class TimedTicks(Listener):
@@ -133,7 +137,10 @@ def command(arguments: Sequence[str]) -> int:
     rows: list[tuple[float, ...]] = []
 
     def adapt(parts: RobotParts) -> tuple[RobotParts, Sequence[Listener]]:
-        if settings.objects or settings.only:
+        if settings.sent:
+            again = settings.sent == "again"
+            parts = replace(parts, camera=SentCamera(settings.objects, parts.surroundings, again=again))
+        elif settings.objects or settings.only:
             parts = replace(parts, camera=CrowdedCamera(parts.camera, settings.objects, only=settings.only))
         timed = TimedTicks(parts.law, rows, all_stages=settings.stages)
         return parts, [timed]

@@ -13,6 +13,7 @@ from robot_side.drivers.remote.driver_session import ArmShape
 from robot_side.drivers.remote.frame_message import FRAME_LIMIT_BYTES
 from robot_side.drivers.remote.messages import STATE_LIMIT_BYTES
 from robot_side.drivers.remote.objects import RemoteObjects
+from robot_side.surroundings.perceived import PerceivedObjects
 
 _TURN_S: Final = 0.004
 _STATES_BYTES_PER_S: Final = 4e6
@@ -50,10 +51,12 @@ class ConnectedDrivers:
         self._arm = RemoteArm(self._ports["--arm"], shape, show, self._note)
         return self._arm
 
-    def objects(self, roles: dict[str, Role], sd_m: float) -> RemoteObjects | None:
-        """Return the source of objects that connects at --objects; None without --objects."""
+    def objects(
+        self, roles: dict[str, Role], unseen_m_s: float, prepare: Callable[[PerceivedObjects], object]
+    ) -> RemoteObjects | None:
+        """Return the source of objects that connects at --objects; None without it. Arguments as for RemoteObjects."""
         if (port := self._ports.get("--objects")) is not None:
-            self._objects = RemoteObjects(port, roles, sd_m, self._note)
+            self._objects = RemoteObjects(port, roles, self._note, unseen_m_s=unseen_m_s, prepare=prepare)
         return self._objects
 
     def wait(self, meanwhile: Callable[[], object]) -> None:

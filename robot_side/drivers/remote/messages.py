@@ -93,7 +93,7 @@ class Refusal(Struct, frozen=True):
 
 _ENCODER: Final = msgspec.msgpack.Encoder()
 _VERSION: Final = msgspec.msgpack.Decoder(dict[str, Any])
-_BAD_BYTES: Final = (msgspec.DecodeError, UnicodeDecodeError, RecursionError)
+BAD_BYTES: Final = (msgspec.DecodeError, UnicodeDecodeError, RecursionError)
 
 
 def encode(message: DriverCommand | Refusal) -> bytes:
@@ -108,7 +108,7 @@ def decoded(payload: bytes, decoder: "msgspec.msgpack.Decoder[Message]", version
     """
     try:
         message = decoder.decode(payload)
-    except _BAD_BYTES as error:
+    except BAD_BYTES as error:
         _require_version(payload, version)
         raise RemoteProtocolError(f"{error}; valid: finite numbers, and fields as in docs/drivers.md") from error
     if (said := getattr(message, "version", None)) != version:
@@ -120,7 +120,7 @@ def _require_version(payload: bytes, version: int) -> None:
     """Raise OtherVersionError if the payload is a map of another version, whatever else the map holds."""
     try:
         said = _VERSION.decode(payload).get("version")
-    except _BAD_BYTES:
+    except BAD_BYTES:
         return
     if isinstance(said, int) and said != version:
         raise OtherVersionError(f"version {said}; valid: {version}")

@@ -1,23 +1,29 @@
 """Perceived objects from a separate process, written in any language."""
 
 import math
-from collections import Counter
-from collections.abc import Callable, Mapping
-from typing import Final, Literal
+from collections import Counter, deque
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any, Final, Literal
+
+import msgspec
+import numpy as np
 
 from common.errors import FeelaheadError, OtherVersionError, RemoteProtocolError
 from common.roles import Role
 from robot_side.drivers.remote.arm import Wire
+from robot_side.drivers.remote.frame_age import UNBOUNDED_S, CarriedFrame, FrameClock
+from robot_side.drivers.remote.frame_build import AT_ONCE, Arrays, Known, ReadObjects, read_in_steps
 from robot_side.drivers.remote.frame_message import (
-    FRAME_DECODER,
+    DEFINES_MESHES,
     FRAME_VERSION,
     MOST_OBJECTS,
+    FrameRefusal,
+    Heard,
     ObjectFrame,
-    SeenObject,
-    perceived,
-    require_possible,
+    UnknownMeshError,
+    read_frame,
+    read_mesh,
 )
-from robot_side.drivers.remote.messages import Refusal, decoded, encode
 from robot_side.surroundings.perceived import PerceivedObjects
 from robot_side.surroundings.roles import role_from_name
 from robot_side.surroundings.validity import require_valid
@@ -25,128 +31,190 @@ from robot_side.surroundings.validity import require_valid
 OLD_S: Final = 0.5
 """Age of the newest frame, in seconds, above which a note is made. The frame stays valid, so triggers stay stiff."""
 _REFUSAL_PERIOD_S: Final = 1.0
+_MOST_WAITING: Final = 16
+"""Maximum number of frames that wait because they define meshes; others are overtaken by newer ones"""
+_UNANSWERED: Final = 50
+"""Number of answers without an echo after which the age of frames counts as unbounded"""
 
-Why = Literal["second", "version", "malformed", "order"]
+Why = Literal["second", "version", "malformed", "order", "clock", "mesh"]
+_Waiting = tuple[bytes, bytes, float]
+"""Peer, payload, and time of reception"""
+
+
+def _unprepared(frame: PerceivedObjects) -> object:
+    return frame
 
 
 class RemoteObjects:
-    """Source of perceived objects: the newest valid frame, from one sender at a time."""
+    """Source of perceived objects: the newest valid frame, from one sender at a time.
 
-    def __init__(self, wire: Wire, roles: Mapping[str, Role], sd_m: float, note: Callable[[str], None]) -> None:
-        """roles: by name, before those in frames. sd_m: σ_c that the law uses. note: called with each fault's line."""
+    A frame is read in steps, one in each call of `exchange`, so that a large one holds up no turn.
+    """
+
+    def __init__(
+        self,
+        wire: Wire,
+        roles: Mapping[str, Role],
+        note: Callable[[str], None],
+        *,
+        unseen_m_s: float = 0.0,
+        prepare: Callable[[PerceivedObjects], object] = _unprepared,
+    ) -> None:
+        """roles: by name, before those in frames. note: called with each fault's line.
+
+        unseen_m_s: speed at which anything may move unseen. prepare: called with each frame before it is perceived, in
+        a step of its own.
+        """
         self.rejected: Counter[Why] = Counter()
         """Number of rejected frames by reason; a frame is rejected as a whole."""
         self.accepted = 0
-        self._wire, self._roles, self._sd_m, self._note = wire, dict(roles), sd_m, note
+        self._wire, self._roles, self._note = wire, dict(roles), note
+        self._unseen_m_s, self._prepare = unseen_m_s, prepare
         self._peer: bytes | None = None
         self._sequence = -1
-        self._heard_s = self._taken_s = self._refused_s = -math.inf
-        self._frame: PerceivedObjects | None = None
-        self._known: list[SeenObject] = []
-        """Each object as it was seen last, at its index in the frames"""
-        self._last_seen: dict[str, int] = {}
-        """Number of the frame that had each known object last"""
+        self._heard_s = self._refused_s = -math.inf
+        self._clock, self._answers = FrameClock(), 0
+        self._waiting: deque[_Waiting] = deque()
+        self._steps: Iterator[None] | None = None
+        self._frame: CarriedFrame | None = None
+        self._known = Known(MOST_OBJECTS)
+        # A robot side without sent objects does not load the kernels for meshes.
+        from robot_side.drivers.remote.sent_meshes import SentMeshes, prepared  # noqa: PLC0415
+
+        self._meshes, self._prepared_mesh = SentMeshes(), prepared
         self._said: set[str] = set()
         self._is_old = False
 
+    @property
+    def busy(self) -> bool:
+        """Whether a frame has come that is not perceived yet"""
+        return self._steps is not None or bool(self._waiting)
+
     def perceive(self, now_s: float) -> PerceivedObjects:
-        """Return the newest frame at `now_s`; FeelaheadError before the first frame."""
+        """Return the newest frame at `now_s`, carried on to then; FeelaheadError before the first frame."""
         if not self.exchange(now_s) or self._frame is None:
             raise FeelaheadError("no objects have been perceived yet")
-        return self._frame
+        return self._frame.at(now_s)
 
     def set_role(self, name: str, role: Role) -> None:
         """Change the role of the object `name` from the next frame on."""
         self._roles[name] = role
 
     def exchange(self, now_s: float) -> bool:
-        """Take the frames that have arrived; return whether there has ever been one."""
-        newest = {peer: (payload, received_s) for peer, payload, received_s in self._wire.receive()}
-        for peer, (payload, received_s) in newest.items():
-            self._receive(peer, payload, received_s)
-        old = self._frame is not None and now_s - self._taken_s > OLD_S
-        if old is not self._is_old:
-            self._is_old = old
-            age = f"the newest frame is {now_s - self._taken_s:.1f} s old; its objects stay valid"
-            self._note(f"objects: {age if old else 'frames arrive again'}")
-        return self._frame is not None
+        """Take the frames that have arrived, and read on by a step; return whether there has ever been a frame."""
+        for message in self._wire.receive():
+            self._queue(message)
+        if self._steps is None and self._waiting:
+            self._steps = self._read(*self._waiting.popleft(), now_s)
+        if self._steps is not None and next(self._steps, self) is self:
+            self._steps = None
+        if self._frame is None:
+            return False
+        age_s = now_s - self._frame.taken_s[1]
+        if (age_s > OLD_S) is not self._is_old:
+            self._is_old = age_s > OLD_S
+            age = f"the newest frame is {age_s:.1f} s old; its objects stay valid"
+            self._note(f"objects: {age if self._is_old else 'frames arrive again'}")
+        return True
 
     def summary(self) -> dict[str, int]:
         """Return the number of accepted frames, and of rejected frames by reason."""
         return {"accepted": self.accepted} | {str(why): count for why, count in self.rejected.items()}
 
-    def _receive(self, peer: bytes, payload: bytes, received_s: float) -> None:
-        if peer != self._peer and received_s - self._heard_s <= OLD_S:
-            self._reject(
-                "second",
-                "a second perception sends, while the first one still does; valid: one at a time",
-                peer,
-                received_s,
-            )
-            return
+    def _queue(self, message: _Waiting) -> None:
+        """Let a message wait; it overtakes those of the same peer that define no meshes."""
+        peer = message[0]
+        kept = [one for one in self._waiting if one[0] != peer or DEFINES_MESHES in one[1]]
+        self._waiting = deque([*kept[-_MOST_WAITING:], message])
+
+    def _read(self, peer: bytes, payload: bytes, received_s: float, now_s: float) -> Iterator[None]:
+        """Read a frame in steps; a fault rejects it as a whole."""
         try:
-            frame = decoded(payload, FRAME_DECODER, FRAME_VERSION)
-            if peer == self._peer and frame.sequence <= self._sequence and received_s - self._heard_s <= OLD_S:
-                why = f"sequence = {frame.sequence}; valid: above that of the frame before, {self._sequence}"
-                self._reject("order", why, peer, received_s)
-                return
-            self._take(frame, received_s)
+            frame = self._begin(peer, payload, received_s, now_s)
+            if frame is not None:
+                yield from self._take(frame, peer, received_s)
         except OtherVersionError as error:
             self._reject("version", str(error), peer, received_s)
         except (RemoteProtocolError, ValueError) as error:
-            self._reject("malformed", str(error), peer, received_s)
-        else:
-            self.accepted += 1
-            self._peer, self._sequence, self._heard_s = peer, frame.sequence, received_s
+            unknown = error.names if isinstance(error, UnknownMeshError) else ()
+            self._reject("mesh" if unknown else "malformed", str(error), peer, received_s, unknown)
 
-    def _take(self, frame: ObjectFrame, received_s: float) -> None:
-        """Take a frame; ValueError if it is invalid."""
-        require_possible(frame)
-        known, present = self._placed(frame), {thing.name for thing in frame.objects}
-        roles = [self._role(thing) if thing.name in present else Role.IGNORED for thing in known]
-        taken_s = received_s - (frame.sent_s - frame.taken_s)
-        seen = perceived(known, roles, taken_s)
+    def _begin(self, peer: bytes, payload: bytes, received_s: float, now_s: float) -> ObjectFrame | None:
+        """Return the frame, if it is in time, and its sender the one who sends."""
+        silent = received_s - self._heard_s > OLD_S
+        if peer != self._peer and not silent:
+            why = "a second perception sends, while the first one still does; valid: one at a time"
+            self._reject("second", why, peer, received_s)
+            return None
+        frame = read_frame(payload)
+        if peer == self._peer and frame.sequence <= self._sequence and not silent:
+            why = f"sequence = {frame.sequence}; valid: above that of the frame before, {self._sequence}"
+            self._reject("order", why, peer, received_s)
+            return None
+        if peer != self._peer or frame.sequence <= self._sequence:
+            self._clock, self._answers = FrameClock(), 0
+        if not self._clock.update(frame, received_s):
+            self._clock = FrameClock()
+            why = "the sender's clock jumped, or echo_s and held_s are not from our answers"
+            self._reject("clock", why, peer, received_s)
+            return None
+        self._answer(frame, peer, now_s)
+        return frame
+
+    def _answer(self, frame: ObjectFrame, peer: bytes, now_s: float) -> None:
+        """Send what the sender echoes, if it does."""
+        if frame.echo_s is not msgspec.UNSET:
+            self._answers += 1
+            self._clock.sends(now_s)
+            self._wire.send(peer, msgspec.msgpack.encode(Heard(FRAME_VERSION, now_s)))
+        if not self._clock.known and (frame.echo_s is msgspec.UNSET or self._answers > _UNANSWERED):
+            text = f"the age of frames is not bounded, as none echoes an answer: each counts as {UNBOUNDED_S} s older"
+            self._report_once("echo", f"objects: {text} (docs/drivers.md)")
+
+    def _take(self, frame: ObjectFrame, peer: bytes, received_s: float) -> Iterator[None]:
+        """Take a frame in steps; ValueError or RemoteProtocolError if it is invalid."""
+        new: dict[str, Any] = {}
+        for name in frame.meshes:
+            new[name] = self._prepared_mesh(name, read_mesh(frame, name))
+            yield
+        meshes = self._meshes.and_also(new)
+        read: ReadObjects | None = None
+        for read in read_in_steps(frame):
+            if read is None:
+                yield
+        if read is None:
+            return
+        taken_s = self._clock.taken_s(frame, received_s)
+        unknown = tuple(dict.fromkeys(name for name in read.meshes if name not in meshes.index))
+        if unknown:
+            raise UnknownMeshError(unknown)
+        placed = np.array([meshes.index[name] for name in read.meshes], dtype=np.int64)
+        shapes: Arrays = {"mesh_library": meshes.library, "mesh_index": placed}
+        seen = self._known.frame(read, self.accepted, self._role, taken_s[1], shapes)
         require_valid(seen)
-        self._known, self._frame, self._taken_s = known, seen, taken_s
-        names = {thing.name for thing in known}
-        self._last_seen = {name: number for name, number in self._last_seen.items() if name in names}
-        self._last_seen |= dict.fromkeys(present, self.accepted)
-        widest = max(frame.objects, key=lambda thing: thing.sd_m, default=None)
-        if widest is not None and widest.sd_m > self._sd_m:
-            text = f"sd_m = {widest.sd_m} of {widest.name!r} is more than {self._sd_m}, which the law uses"
-            self._report_once("sd", f"objects: {text}; to raise that: --camera.sd-m {widest.sd_m}")
+        carried = CarriedFrame(seen, taken_s, self._unseen_m_s)
+        if len(seen.names) > AT_ONCE:
+            yield
+            self._prepare(seen)
+            yield
+        self._prepare(carried.at(received_s))
+        self._frame, self._meshes = carried, meshes
+        self.accepted += 1
+        self._peer, self._sequence, self._heard_s = peer, frame.sequence, received_s
 
-    def _placed(self, frame: ObjectFrame) -> list[SeenObject]:
-        """Return the known objects with those of the frame, each at its index.
-
-        A missing object has no shape but keeps its name and index, as it may be held. If there is no room, a new object
-        takes the index of the one that has been gone longest, whose name is forgotten.
-        """
-        seen = {thing.name: thing for thing in frame.objects}
-        placed = [seen.pop(thing.name, thing) for thing in self._known]
-        present = {thing.name for thing in frame.objects}
-        new = list(seen.values())
-        room = max(MOST_OBJECTS - len(placed), 0)
-        if len(new) > room:
-            gone = [index for index, thing in enumerate(placed) if thing.name not in present]
-            gone.sort(key=lambda index: self._last_seen[placed[index].name])
-            for index, thing in zip(gone, new[room:], strict=False):
-                placed[index] = thing
-        return placed + new[:room]
-
-    def _role(self, thing: SeenObject) -> Role:
-        return self._roles.get(thing.name) or thing.role or role_from_name(thing.name)
+    def _role(self, name: str, sent: Role | None) -> Role:
+        return self._roles.get(name) or sent or role_from_name(name)
 
     def _report_once(self, about: str, text: str) -> None:
         if about not in self._said:
             self._said.add(about)
             self._note(text)
 
-    def _reject(self, why: Why, text: str, peer: bytes, now_s: float) -> None:
+    def _reject(self, why: Why, text: str, peer: bytes, now_s: float, unknown: tuple[str, ...] = ()) -> None:
         self.rejected[why] += 1
         self._report_once(
             why, f"objects: a frame was refused as a whole: {text} (further frames with this fault are only counted)"
         )
         if now_s - self._refused_s >= _REFUSAL_PERIOD_S:
             self._refused_s = now_s
-            self._wire.send(peer, encode(Refusal(FRAME_VERSION, text)))
+            self._wire.send(peer, msgspec.msgpack.encode(FrameRefusal(FRAME_VERSION, text, unknown)))

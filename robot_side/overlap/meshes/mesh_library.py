@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -30,10 +31,26 @@ class MeshBounds:
     """Radius of each sphere (m,)"""
 
 
+class Source(NamedTuple):
+    """What a mesh is made from."""
+
+    vertices_m: bytes
+    """(v, 3) float64"""
+    triangles: bytes
+    """(t, 3) int64"""
+
+    def mesh(self) -> Mesh:
+        """Return the mesh."""
+        vertices_m = np.frombuffer(self.vertices_m).reshape(-1, 3)
+        return Mesh(vertices_m, np.frombuffer(self.triangles, dtype=np.int64).reshape(-1, 3))
+
+
 class MeshLibrary:
     """Meshes to which a scene refers by their indices; immutable. ValueError for an empty list."""
 
-    def __init__(self, meshes: Sequence[Mesh]) -> None:
+    def __init__(self, meshes: Sequence[Mesh], sources: tuple[Source, ...] = ()) -> None:
+        """sources: what each mesh was made from, if a recording has to hold it; a model's meshes are known."""
+        self.sources = sources
         if not meshes:
             raise ValueError("meshes is empty; valid: one mesh or more")
         for index, mesh in enumerate(meshes):

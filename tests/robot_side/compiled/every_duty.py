@@ -15,7 +15,10 @@ from common.roles import Role
 from robot_side.compiled.kernel import late_kernels
 from robot_side.compiled.warm_up import warm_up
 from robot_side.drivers.mujoco.scene import load_scene
-from robot_side.drivers.remote.frame_message import SHAPES, SeenObject, perceived
+from robot_side.drivers.remote.frame_build import perceived
+from robot_side.drivers.remote.frame_message import SHAPES, SeenObject, SentMesh
+from robot_side.drivers.remote.sent_meshes import SentMeshes
+from robot_side.drivers.remote.sent_meshes import prepared as prepared_mesh
 from robot_side.laws.named import LAWS
 from robot_side.parts import SceneParts, build_parts
 from robot_side.surroundings.perceived import PerceivedObjects
@@ -102,14 +105,17 @@ class Driver:
             SeenObject(name="thing", ellipsoid=(0.02, 0.03, 0.04)),
             SeenObject(name="thing", half_space=True),
             SeenObject(name="thing", tetrahedra=(corners,)),
+            SeenObject(name="thing", mesh="wedge"),
         )
+        wedge = prepared_mesh("wedge", SentMesh(corners, ((0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3))))
+        self._library = SentMeshes().and_also({"wedge": wedge}).library
         assert len(self._things) == len(SHAPES)
         self.place_m = np.zeros(3)
 
     def perceive(self, now_s: float) -> PerceivedObjects:
         thing, (x, y, z) = self._things[round(now_s / 0.04) % len(self._things)], self.place_m.tolist()
         shown = msgspec.structs.replace(thing, position_m=(x, y, z), velocity_m_s=(0.0, 0.01, 0.0))
-        return perceived([shown], [Role.OBSTACLE], now_s)
+        return perceived([shown], [Role.OBSTACLE], now_s, self._library)
 
     def set_role(self, name: str, role: Role) -> None:
         del name, role

@@ -47,8 +47,19 @@ COUNTS = st.tuples(*(st.integers(0, 5) for _ in ARRAYS))
 
 
 def test_every_array_of_a_frame_is_recorded() -> None:
-    # The core does not read `positions_m` and `rotations`, and `since` repeats the arrays.
-    others = {"time_s", "names", "roles", "mesh_library", "positions_m", "rotations", "since"}
+    # The core does not read `positions_m` and `rotations`, `since` repeats the arrays; errors are recorded if there.
+    others = {
+        "sds_m",
+        "unseen_m",
+        "late_s",
+        "time_s",
+        "names",
+        "roles",
+        "mesh_library",
+        "positions_m",
+        "rotations",
+        "since",
+    }
     assert {field.name for field in fields(PerceivedObjects)} == {*ARRAYS, *others}
 
 

@@ -15,8 +15,7 @@ from robot_side.arm.limits import ArmLimits
 from robot_side.drivers.mujoco.scene import Scene
 from robot_side.drivers.remote.arm import RemoteArm
 from robot_side.drivers.remote.driver_session import ArmShape
-from robot_side.drivers.remote.frame_message import FRAME_DECODER, FRAME_VERSION, require_possible
-from robot_side.drivers.remote.messages import decoded
+from robot_side.drivers.remote.frame_message import read_frame, read_object
 from robot_side.drivers.remote.objects import RemoteObjects
 from tests.helpers.machines.waiting import LIMIT_S
 from tests.helpers.python_process import start
@@ -99,7 +98,7 @@ def stands_since(since_s: float, arm: RemoteArm, port: DriverPort) -> bool:
 @pytest.mark.processes
 def test_the_example_of_perception_is_perceived(port: DriverPort) -> None:
     notes: list[str] = []
-    objects = RemoteObjects(port, {}, 0.003, notes.append)
+    objects = RemoteObjects(port, {}, notes.append)
     with running("example_objects.py", port.endpoint):
         assert any(objects.exchange(port.wait(TURN_S)) for _ in range(ROUNDS))
         frame = objects.perceive(port.wait(0.0))
@@ -125,9 +124,9 @@ def test_the_example_in_cpp_packs_what_the_robot_side_reads(tmp_path: Path) -> N
     build = ["g++", "-std=c++17", "-Wall", "-Wextra", "-Werror", f"-I{tmp_path}", str(EXAMPLES / "example_objects.cpp")]
     subprocess.run([*build, "-o", str(program)], check=True, timeout=LIMIT_S)
     payload = subprocess.run([str(program)], check=True, capture_output=True, timeout=LIMIT_S).stdout
-    frame = decoded(payload, FRAME_DECODER, FRAME_VERSION)
-    require_possible(frame)
-    assert [(thing.name, thing.half_space, thing.sphere) for thing in frame.objects] == [
+    frame = read_frame(payload)
+    things = [read_object(frame, number) for number in range(len(frame.objects))]
+    assert [(thing.name, thing.half_space, thing.sphere) for thing in things] == [
         ("table", True, None),
         ("target", False, 0.03),
     ]

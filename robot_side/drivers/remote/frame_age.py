@@ -1,0 +1,104 @@
+"""Age of a frame of objects, as far as stamps bound it, and what is not known of the motion since (docs/drivers.md)."""
+
+import math
+from typing import Final, NamedTuple
+
+import msgspec
+import numpy as np
+
+from common.arrays import FloatArray
+from robot_side.drivers.remote.driver_clock import DriverClock
+from robot_side.drivers.remote.frame_message import ObjectFrame
+from robot_side.surroundings.movers import Movers
+from robot_side.surroundings.perceived import PerceivedObjects
+
+UNBOUNDED_S: Final = 0.5
+"""Time by which a frame may be older than it seems, where no echo bounds its age"""
+MOST_CARRIED_S: Final = 0.5
+"""Longest time for which an object is carried on by its velocity"""
+MOST_GROWN_S: Final = 5.0
+"""Age from which on what is not known of an object's motion grows no more"""
+_CARRIED_PERIOD_S: Final = 0.008
+"""Period in which moving objects are carried on: looks are made no more often"""
+_STEP_M: Final = 0.0005
+"""Steps in which the distance that objects may have moved unseen is rounded up"""
+_STILL_M_S: Final = 0.002
+"""Speed up to which an object counts as at rest"""
+
+
+class FrameClock:
+    """Bounds of the sender's clock minus ours, from stamps of frames and of the answers that they echo."""
+
+    def __init__(self) -> None:
+        self._clock = DriverClock()
+        self._first_sent_s = math.inf
+
+    def sends(self, now_s: float) -> None:
+        """Note that an answer leaves, stamped `now_s`."""
+        self._first_sent_s = min(self._first_sent_s, now_s)
+
+    def update(self, frame: ObjectFrame, received_s: float) -> bool:
+        """Take a frame's stamps; False if they contradict earlier stamps."""
+        echo_s = None if frame.echo_s is msgspec.UNSET else frame.echo_s
+        ours = echo_s is not None and self._first_sent_s <= echo_s <= received_s
+        echoed = (echo_s, frame.held_s) if ours and echo_s is not None else None
+        return self._clock.update(frame.sent_s, received_s, echoed)
+
+    @property
+    def known(self) -> bool:
+        """Whether the age of frames is bounded"""
+        return self._clock.known
+
+    def taken_s(self, frame: ObjectFrame, received_s: float) -> tuple[float, float]:
+        """Return the earliest and the latest possible time, on our clock, at which a frame's picture was taken."""
+        latest_s = min(self._clock.latest_s(frame.taken_s), received_s - (frame.sent_s - frame.taken_s))
+        earliest_s = self._clock.ours_s(frame.taken_s) if self._clock.known else latest_s - UNBOUNDED_S
+        return min(earliest_s, latest_s), latest_s
+
+
+class Since(NamedTuple):
+    """What is known of the motion since a frame's picture was taken."""
+
+    carried_s: float
+    """Time for which moving objects are carried on"""
+    late_s: float
+    """Time by which they may be ahead of or behind that"""
+    unseen_m: float
+    """Distance by which any object may have moved in a way that the sender has not seen"""
+
+
+def since(taken_s: tuple[float, float], now_s: float, unseen_m_s: float) -> Since:
+    """Return what is known at `now_s` of the motion since a picture, taken between the two times `taken_s`."""
+    earliest_s, latest_s = taken_s
+    least_s, most_s = max(now_s - latest_s, 0.0), max(now_s - earliest_s, 0.0)
+    carried_s = min(0.5 * (least_s + most_s), MOST_CARRIED_S)
+    late_s = min(max(most_s - carried_s, carried_s - least_s), MOST_GROWN_S)
+    steps = math.ceil(unseen_m_s * min(most_s, MOST_GROWN_S) / _STEP_M - 1e-9)
+    return Since(carried_s, late_s, _STEP_M * steps)
+
+
+class CarriedFrame:
+    """Frame whose moving objects are carried on by their velocities, and whose errors grow with its age."""
+
+    def __init__(self, first: PerceivedObjects, taken_s: tuple[float, float], unseen_m_s: float) -> None:
+        """first: the frame as it was sent. unseen_m_s: speed at which anything may move unseen."""
+        self.taken_s, self._unseen_m_s = taken_s, unseen_m_s
+        velocities = np.zeros((len(first.names), 3)) if first.velocities_m_s is None else first.velocities_m_s
+        moving = np.flatnonzero(np.einsum("ki,ki->k", velocities, velocities) > _STILL_M_S**2)
+        self._velocities_m_s: FloatArray = velocities[moving]
+        self._movers = Movers(first, moving)
+        self._shown: PerceivedObjects | None = None
+        self._shown_since = Since(-math.inf, 0.0, 0.0)
+
+    def at(self, now_s: float) -> PerceivedObjects:
+        """Return the frame at `now_s`: the same object until something in it has changed."""
+        known, shown = since(self.taken_s, now_s, self._unseen_m_s), self._shown_since
+        moves, first = len(self._velocities_m_s) > 0, self._movers.first
+        due = moves and abs(known.carried_s + known.late_s - shown.carried_s - shown.late_s) >= _CARRIED_PERIOD_S
+        if self._shown is None or due or known.unseen_m != shown.unseen_m:
+            self._shown_since = known
+            by_m = known.carried_s * self._velocities_m_s
+            late_s = known.late_s if moves else 0.0
+            numbers = self._movers.displaced(by_m)
+            self._shown = self._movers.frame(first.time_s, numbers, first.roles, known.unseen_m, late_s)
+        return self._shown
