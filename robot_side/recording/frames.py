@@ -15,16 +15,13 @@ Values are float64 or int64, bit for bit as the core got them.
 import math
 import struct
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import msgspec
 import numpy as np
 
 from common.roles import Role
-from robot_side.surroundings.perceived import KINDS, PerceivedObjects
-
-if TYPE_CHECKING:
-    from robot_side.overlap.meshes.mesh_library import MeshLibrary
+from robot_side.surroundings.perceived import KINDS, PerceivedObjects, library_of
 
 ARRAYS: Final[Mapping[str, tuple[type, tuple[int, ...]]]] = {
     name: described
@@ -126,7 +123,7 @@ class FrameUnpacker:
         library = None if last is None else last.mesh_library
         if flags & _HAS_MESHES:
             sources, position = _content(content, position, tuple[tuple[bytes, bytes], ...])
-            library = _library(sources)
+            library = library_of(sources)
         names, position = (last.names, position) if last is not None else _content(content, position, tuple[str, ...])
         if library is None:
             others = names != self._scene.names
@@ -145,14 +142,6 @@ def _content(content: bytes, position: int, kind: Any) -> tuple[Any, int]:
     (length,) = _LENGTH.unpack_from(content, position)
     begin = position + _LENGTH.size
     return msgspec.msgpack.decode(content[begin : begin + length], type=kind), begin + length
-
-
-def _library(sources: Any) -> "MeshLibrary":
-    # A recording without sent meshes does not load the kernels for them.
-    from robot_side.overlap.meshes.mesh_library import MeshLibrary, Source  # noqa: PLC0415
-
-    known = tuple(Source(*source) for source in sources)
-    return MeshLibrary([source.mesh() for source in known], known)
 
 
 def _unpacked(content: bytes, position: int, kind: type, shape: tuple[int, ...], last: Any) -> tuple[Any, int]:

@@ -1,6 +1,6 @@
 """Objects from the camera: spheres, boxes, tetrahedra, half-spaces, meshes and ellipsoids, each with a role."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Final, Protocol
 
@@ -95,6 +95,15 @@ def displaced(objects: PerceivedObjects, by_m: FloatArray) -> PerceivedObjects:
         mesh_positions_m=objects.mesh_positions_m + by_m,
         ellipsoid_centers_m=objects.ellipsoid_centers_m + by_m,
     )
+
+
+def library_of(sources: Sequence[tuple[bytes, bytes]]) -> "MeshLibrary":
+    """Return the library of meshes with these vertices and triangles, see `Source`."""
+    # A scene without meshes does not load the kernels for them.
+    from robot_side.overlap.meshes.mesh_library import MeshLibrary, Source  # noqa: PLC0415
+
+    known = tuple(Source(*source) for source in sources)
+    return MeshLibrary([source.mesh() for source in known], known)
 
 
 class SomeObjects(Protocol):

@@ -51,7 +51,8 @@ class FrameClock:
 
     def taken_s(self, frame: ObjectFrame, received_s: float) -> tuple[float, float]:
         """Return the earliest and the latest possible time, on our clock, at which a frame's picture was taken."""
-        latest_s = min(self._clock.latest_s(frame.taken_s), received_s - (frame.sent_s - frame.taken_s))
+        least_offset_s = self._clock.drivers_s(0.0)
+        latest_s = min(frame.taken_s - least_offset_s, received_s - (frame.sent_s - frame.taken_s))
         earliest_s = self._clock.ours_s(frame.taken_s) if self._clock.known else latest_s - UNBOUNDED_S
         return min(earliest_s, latest_s), latest_s
 
