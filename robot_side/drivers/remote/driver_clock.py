@@ -37,10 +37,6 @@ class DriverClock:
         """Return the earliest possible time of `driver_s` on our clock; minus infinity before the first echo."""
         return driver_s - self._interval.at(self._at_s)[1]
 
-    def latest_s(self, driver_s: float) -> float:
-        """Return the latest possible time of `driver_s` on our clock; infinity before the first message."""
-        return driver_s - self._interval.at(self._at_s)[0]
-
     def drivers_s(self, our_s: float) -> float:
         """Return the earliest possible time of `our_s` on the driver's clock."""
         return our_s + self._interval.at(self._at_s)[0]
