@@ -48,6 +48,7 @@ from robot_side.operators.operator_session import OperatorSession
 from robot_side.operators.safety import Safety
 from robot_side.operators.tuning import Tuning
 from robot_side.settings import RobotSettings
+from robot_side.surroundings.fixed_objects import fixed_objects, with_fixed
 from robot_side.surroundings.own_perception import perceived_by
 from robot_side.surroundings.perceived import KINDS, PerceivedObjects
 from robot_side.surroundings.surroundings import Surroundings
@@ -65,6 +66,8 @@ class SceneParts(RobotParts):
 
     kinematics: MujocoKinematics
     scene: Scene
+    fixed: PerceivedObjects
+    """Objects that are always there, whatever a camera sees"""
     any_objects: bool
     """Whether objects of any kind may appear during the run"""
     explains: "NamedLaw"
@@ -78,7 +81,11 @@ class SceneParts(RobotParts):
         A scene's primitives stay the same during a run. The primitives of ignored objects count, too.
         """
         seen = as_loaded(self.scene, dict.fromkeys(self.scene.roles, Role.OBSTACLE))
-        unneeded = {kind.kernel for kind in KINDS if not (self.any_objects or len(getattr(seen, kind.owner)))}
+        unneeded = {
+            kind.kernel
+            for kind in KINDS
+            if not (self.any_objects or len(getattr(seen, kind.owner)) or len(getattr(self.fixed, kind.owner)))
+        }
         return [kernel for kernel in imported_kernels() if kernel not in unneeded]
 
 
@@ -120,6 +127,8 @@ def build_parts(
     surroundings = Surroundings()
     unseen_m_s = settings.camera.unseen_m_s
     seen_elsewhere = None if drivers is None else drivers.objects(settings.roles, unseen_m_s, surroundings.see)
+    sides = settings.arm_workspace
+    fixed = fixed_objects(None if sides is None else (sides.lower_m, sides.upper_m), settings.arm_keep_out)
     # Before the first tick, as a search for spheres takes far longer than one.
     first = as_loaded(scene, scene.roles) if settings.objects is None else perceived([], [], 0.0)
     held_covers = HeldCovers(first, settings.cover_m, scene.never_held, searching)
@@ -141,7 +150,8 @@ def build_parts(
     return SceneParts(
         arm=arm,
         kinematics=kinematics,
-        camera=seen_elsewhere or perceived_by(settings.perception, camera),
+        camera=with_fixed(seen_elsewhere or perceived_by(settings.perception, camera), fixed),
+        fixed=fixed,
         law=law,
         explains=law,
         enlarged=enlarged,

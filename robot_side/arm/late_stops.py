@@ -70,7 +70,9 @@ class LateStops:
         share = min(1.0, float((most / np.maximum(np.abs(change), 1e-12)).min()))
         self._expected = before + share * change
         if self._began is not None and target.any():
-            self._began = None  # the operator goes on: no whole stop
+            if not before.any():  # it should stand by now: it is late by at least what it has moved beyond
+                self._judge(state.joint_positions_rad, *self._began)
+            self._began = None
         if self._began is None and not target.any() and (np.abs(before) > self._from).any():
             self._began, self._way = (state.joint_positions_rad, before, measured), np.zeros_like(before)
         if self._began is None:

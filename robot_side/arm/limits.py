@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Annotated, Final
+from typing import Annotated, Any, Final
 
 import numpy as np
 from msgspec import Meta
@@ -76,8 +76,22 @@ class ArmLimits:
 
     def unless_known(self, others: "ArmLimits") -> "ArmLimits":
         """Return these limits, with the others' where these are not known."""
-        known = {name: value for name, value in vars(self).items() if value is not None}
-        return replace(others, **known)
+        return replace(others, **self._known())
+
+    def sources(self, said: "ArmLimits") -> str:
+        """Tell which limits are these, the settings', and which are those that the arm's driver said."""
+        sources = ("from the settings", self._known()), ("from its driver", said._known().keys() - self._known().keys())
+        told = [f"{', '.join(sorted(names))} {source}" for source, names in sources if names]
+        both = self.unless_known(said)
+        if both.velocity_rad_s is None or both.acceleration_rad_s2 is None:
+            told.append(
+                f"where velocity or acceleration is not known, {VELOCITY_RAD_S:g} rad/s and {ACCELERATION_RAD_S2:g}"
+                " rad/s² are assumed (to measure them: feelahead-robot --measure-limits)"
+            )
+        return "; ".join(told)
+
+    def _known(self) -> dict[str, Any]:
+        return {name: value for name, value in vars(self).items() if value is not None}
 
 
 @dataclass

@@ -78,9 +78,9 @@ class ConnectedDrivers:
             meanwhile()
             self._ports[waiting[0]].wait(_TURN_S)
 
-    def said_limits(self) -> ArmLimits | None:
-        """Return the limits that the arm's driver has said of its arm; None without any."""
-        return None if self._arm is None else self._arm.session.said_limits
+    def said_limits(self) -> ArmLimits:
+        """Return the limits that the arm's driver has said of its arm; none are known if it said none."""
+        return (None if self._arm is None else self._arm.session.said_limits) or ArmLimits()
 
     def limits_taken(self) -> None:
         """Judge the arm's states by its limits as they are now."""
