@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from robot_side.arm.following import Following
 from robot_side.arm.joint_estimate import lateness_s
+from robot_side.arm.limits import ArmLimits
 from robot_side.drivers.remote.driver_session import TAKEN_OVER_S
 from robot_side.operators.safety import SafetySettings
 from tests.robot_side.drivers.remote.driver_desk import AHEAD_S, LIMITS, SHAPE, TICK_S, DriverDesk
@@ -292,3 +293,39 @@ def test_a_driver_that_loses_commands_is_noticed(
             said.add(following.text)
     assert (says in said) if says else said == {None}
     assert (following.stop is not None) is (says is not None and "not move" in says)
+
+
+def test_the_first_state_says_the_arms_limits_and_each_its_condition() -> None:
+    desk = DriverDesk()
+    desk.also = {"limits": {"velocity_rad_s": [1.0, 2.0], "acceleration_rad_s2": [3.0, 4.0], "latency_s": 0.05}}
+    desk.run(0.1)
+    desk.also = {"limits": {"velocity_rad_s": [9.0, 9.0]}}
+    desk.run(0.1)
+    assert desk.arm.session.said_limits == ArmLimits((1.0, 2.0), (3.0, 4.0), latency_s=0.05)
+    assert desk.arm.state(desk.now_s).condition is None
+    desk.also = {"condition": "protective_stop", "condition_text": "joint 4 met something"}
+    desk.run(0.1)
+    assert desk.arm.state(desk.now_s).condition == "the arm is in a protective stop: joint 4 met something"
+    desk.also = {"condition": "emergency_stop"}
+    desk.run(0.1)
+    assert desk.arm.state(desk.now_s).condition == "the arm is in an emergency stop"
+
+
+@pytest.mark.parametrize(
+    ("fields", "why", "says"),
+    [
+        ({"limits": {"velocity_rad_s": [1.0]}}, "joints", "limits.velocity_rad_s holds 1 values; valid: 2"),
+        ({"limits": {"velocity_rad_s": [1.0, -1.0]}}, "malformed", "limits.velocity_rad_s"),
+        ({"limits": {"speed": [1.0, 1.0]}}, "malformed", "speed"),
+        ({"condition": "tired"}, "malformed", "condition"),
+        ({"condition_text": "a\nb"}, "malformed", "printable"),
+        ({"condition_text": "a" * 201}, "malformed", "condition_text"),
+    ],
+)
+def test_wrong_limits_and_conditions_are_refused(fields: dict[str, Any], why: Any, says: str) -> None:
+    desk = DriverDesk()
+    desk.run(0.1)
+    desk.also = fields
+    desk.run(0.05)
+    assert desk.arm.session.rejected[why] > 0
+    assert says in desk.refused[0]
