@@ -179,6 +179,20 @@ def test_a_changed_role_and_a_revocation_reach_peers_that_are_connected(tmp_path
         wait_until("no view arrives any more", lambda: views() == 0 and views() == 0)
 
 
+def test_a_message_of_a_driver_that_nobody_reads_does_not_keep_the_door_from_opening() -> None:
+    """Its port is read later, as the robot side searches for spheres and compiles first."""
+    arm = {"--arm": DriverSettings(EPHEMERAL, "driver", 4096, 1e6)}
+    with Door(DoorSettings(EPHEMERAL, EPHEMERAL, arm), print) as door, zmq.Context() as context:
+        door.ready()
+        with context.socket(zmq.DEALER) as driver:
+            driver.setsockopt(zmq.LINGER, 0)
+            driver.connect(door.drivers["--arm"].bind)
+            driver.send(b"state")
+            wait_until("the message waits", lambda: door.wait(0.05) and len(door.ports["--arm"].arrived) > 0)
+            assert door.listen().control
+            assert [payload for _, payload, _ in door.ports["--arm"].receive()] == [b"state"]
+
+
 def test_a_subscription_to_what_there_is_not_takes_no_memory_and_ends_the_viewer(door: Opened) -> None:
     with zmq.Context() as context, context.socket(zmq.SUB) as viewer, connected(door.at) as operator:
         viewer.setsockopt(zmq.LINGER, 0)
