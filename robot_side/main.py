@@ -100,7 +100,7 @@ def command(arguments: Sequence[str], adapt: Callable[[RobotParts], Adapted] = a
         if recording is not None:
             also = {"kernels": kernel_digests(), "notes": parts.notes}
             recording.begin(provenance(settings, epoch, clock_domain()) | also)
-        model = PerceivedModel(parts.scene) if parts.any_objects else SceneModel(parts.scene)
+        model = PerceivedModel(parts.scene) if parts.any_objects else SceneModel(parts.scene, parts.fixed)
         eyes = (first_person_eye(parts.scene), overview_eye(parts.scene)) if settings.cameras.on else (None, None)
         view = SceneView(model, parts.kinematics, parts.explains, parts.enlarged, parts.surroundings, *eyes)
 

@@ -31,7 +31,7 @@ class PlacedBox(Protocol):
         ...
 
 
-_SIDES = tuple(f"workspace {sign}{axis}" for sign in "+-" for axis in "xyz")
+SIDES = tuple(f"workspace {sign}{axis}" for sign in "+-" for axis in "xyz")
 
 
 def fixed_objects(workspace: tuple[Vector3, Vector3] | None, keep_out: Sequence[PlacedBox]) -> PerceivedObjects:
@@ -45,7 +45,7 @@ def fixed_objects(workspace: tuple[Vector3, Vector3] | None, keep_out: Sequence[
         normals = np.concatenate([-np.eye(3), np.eye(3)])
         offsets_m = np.concatenate([-np.array(workspace[1]), np.array(workspace[0])])
     boxes, sides = len(keep_out), len(offsets_m)
-    names = (*(f"keep out {number}" for number in range(1, boxes + 1)), *_SIDES[:sides])
+    names = (*(f"keep out {number}" for number in range(1, boxes + 1)), *SIDES[:sides])
     turned = [Rotation.from_quat(one.quaternion, scalar_first=True).as_matrix() for one in keep_out]
     centers_m = np.array([one.center_m for one in keep_out]).reshape(-1, 3)
     return PerceivedObjects(

@@ -7,11 +7,11 @@ import numpy as np
 
 from common.protocol.view_messages import Shape
 from robot_side.drivers.mujoco.scene import Scene
+from robot_side.surroundings.fixed_objects import SIDES
 from robot_side.surroundings.perceived import KINDS, PerceivedObjects
-from robot_side.viewing.shapes import SceneModel
+from robot_side.viewing.shapes import IN_PLACE, SceneModel
 
 _SIZES: Final = {"sphere": "sphere_radii_m", "box": "box_half_sizes_m", "ellipsoid": "ellipsoid_half_axes_m"}
-_IN_PLACE: Final = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
 _CORNERS: Final = np.array([[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]], dtype="<u4")
 
 
@@ -44,22 +44,23 @@ class PerceivedModel(SceneModel):
         for kind, name in _SIZES.items():
             for size in getattr(frame, name)[getattr(frame, f"{kind}_object") == index]:
                 x, y, z = [*np.atleast_1d(size).tolist(), 0.0, 0.0][:3]
-                yield Shape(index, False, kind, (x, y, z), _IN_PLACE)  # type: ignore[arg-type]
-        if index in frame.half_space_object:
-            yield Shape(index, False, "plane", (0.0, 0.0, 0.0), _IN_PLACE)
+                yield Shape(index, False, kind, (x, y, z), IN_PLACE)  # type: ignore[arg-type]
+        # The sides of the workspace would cover all else.
+        if index in frame.half_space_object and frame.names[index] not in SIDES:
+            yield Shape(index, False, "plane", (0.0, 0.0, 0.0), IN_PLACE)
         for corners in frame.tetrahedron_vertices_m[frame.tetrahedron_object == index]:
             own = (corners - frame.positions_m[index]) @ frame.rotations[index]
             # Anticlockwise as seen from outside, for either orientation of the corners.
             triangles = _CORNERS if np.linalg.det(own[1:] - own[0]) < 0.0 else _CORNERS[:, ::-1]
             yield Shape(
-                *(index, False, "mesh", (1.0, 1.0, 1.0), _IN_PLACE),
+                *(index, False, "mesh", (1.0, 1.0, 1.0), IN_PLACE),
                 vertices_m=own.astype("<f4").tobytes(),
                 triangles=triangles.tobytes(),
             )
         placed = frame.mesh_index[frame.mesh_object == index]
         for corners in [] if frame.mesh_library is None else [frame.mesh_library.corners_m[mesh] for mesh in placed]:
             yield Shape(
-                *(index, False, "mesh", (1.0, 1.0, 1.0), _IN_PLACE),
+                *(index, False, "mesh", (1.0, 1.0, 1.0), IN_PLACE),
                 vertices_m=corners.astype("<f4").tobytes(),
                 triangles=np.arange(3 * len(corners), dtype="<u4").tobytes(),
             )

@@ -27,21 +27,26 @@ _SIZES: Final = {"sphere": 1, "capsule": 2, "cylinder": 2, "plane": 2, "box": 3,
 """How many of a geom's three sizes its kind uses"""
 
 
+IN_PLACE: Final = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
+
+
 class SceneModel:
     """Links and objects of a scene, and their shapes in their own frames."""
 
-    def __init__(self, scene: Scene) -> None:
+    def __init__(self, scene: Scene, fixed: PerceivedObjects | None = None) -> None:
+        """fixed: objects that each frame has behind the scene's own; of these, boxes are drawn."""
         model, robot = scene.model, scene.robot
+        self._fixed = fixed
         of_robot = np.flatnonzero(model.body_rootid[model.geom_bodyid] == robot.root_body)
         shown = of_robot[model.geom_group[of_robot] < _SHOWN_GROUPS]
         self._link_geoms = shown if shown.size else of_robot
         self.bodies: IntArray = np.unique(model.geom_bodyid[self._link_geoms]).astype(np.int64)
         """(n,) bodies of the robot's links"""
         self.links = tuple(model.body(int(body)).name or f"body{body}" for body in self.bodies)
-        self.objects = tuple(thing.name for thing in scene.objects)
-        fixed = scene.fixed
+        of_scene = tuple(thing.name for thing in scene.objects)
+        self.objects = of_scene + (() if fixed is None else fixed.names)
         self.may_move: IntArray = np.array(
-            [index for index, name in enumerate(self.objects) if name not in fixed], dtype=np.int64
+            [index for index, name in enumerate(of_scene) if name not in scene.fixed], dtype=np.int64
         )
         """Indices of the objects that a joint or a mocap body can move"""
         self._model = model
@@ -62,6 +67,13 @@ class SceneModel:
 
     def object_shapes(self, index: int) -> Iterator[Shape]:
         """Yield the shapes of one object, in the frame of its first geom; joints inside keep their start positions."""
+        if (beyond := index - len(self._geoms)) >= 0:
+            sizes = (
+                [] if self._fixed is None else self._fixed.box_half_sizes_m[self._fixed.box_object == beyond].tolist()
+            )
+            for size in sizes:
+                yield Shape(index, False, "box", (size[0], size[1], size[2]), IN_PLACE)
+            return
         positions_m, rotations = self._start
         first = self._geoms[index][0]
         yield self._shape(first, index, False, np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]))

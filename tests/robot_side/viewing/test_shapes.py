@@ -10,10 +10,12 @@ from common.protocol.codec import VIEW_MAXIMUM_BYTES, decode_view
 from common.protocol.messages import Header
 from common.protocol.view_messages import SceneShapes, SceneState, Shape
 from common.roles import Role
+from robot_side.arm.bounds import KeepOut, Workspace
 from robot_side.core.robot_side import RobotSide
 from robot_side.drivers.mujoco.scene import Scene, load_scene
 from robot_side.parts import build_parts
 from robot_side.settings import RobotSettings
+from robot_side.surroundings.fixed_objects import SIDES
 from robot_side.tick.sensed import Sensed
 from robot_side.tick.situation import Situation
 from robot_side.viewing import scene_view
@@ -29,7 +31,7 @@ def looked_at(settings: RobotSettings, scene: Scene | None = None) -> tuple[Robo
     robot = RobotSide(parts)
     robot.tick(0.0)
     return robot, SceneView(
-        SceneModel(parts.scene), parts.kinematics, parts.explains, parts.enlarged, parts.surroundings
+        SceneModel(parts.scene, parts.fixed), parts.kinematics, parts.explains, parts.enlarged, parts.surroundings
     )
 
 
@@ -186,3 +188,17 @@ def test_what_is_moved_without_a_joint_is_said_too(monkeypatch: pytest.MonkeyPat
     assert {said.objects[one] for one in index} == {"post", "Target_egg", "wall"}
     poses = np.frombuffer(state.object_poses, "<f4").reshape(-1, 7)
     assert poses[index.index(wall), :3] == pytest.approx(shifted_m[wall], abs=1e-6)
+
+
+def test_boxes_to_keep_out_of_are_drawn_behind_the_scenes_own_objects_and_sides_are_not() -> None:
+    sides = Workspace((-2.0, -2.0, 0.0), (2.0, 2.0, 2.0))
+    settings = RobotSettings(arm_workspace=sides, arm_keep_out=(KeepOut((0.5, 0.6, 0.2), (0.1, 0.05, 0.2)),))
+    robot, view = looked_at(settings)
+    shapes = shapes_of(robot, view)
+    index = shapes.objects.index("keep out 1")
+    [drawn] = [shape for shape in shapes.shapes if not shape.of_robot and shape.owner == index]
+    assert (drawn.kind, drawn.size_m) == ("box", (0.1, 0.05, 0.2))
+    beyond = {shapes.objects.index(name) for name in SIDES}
+    assert not [shape for shape in shapes.shapes if not shape.of_robot and shape.owner in beyond]
+    assert robot.newest is not None
+    state_of(view, *robot.newest)
