@@ -64,7 +64,7 @@ def command(arguments: Sequence[str], adapt: Callable[[RobotParts], Adapted] = a
     ports = DoorSettings(
         settings.bind,
         settings.view_bind,
-        driver_ports(settings.arm, settings.objects),
+        driver_ports(settings.arm, settings.objects, settings.pictures),
         insecure=settings.insecure,
         keys=None if settings.keys is None else str(settings.keys),
     )
@@ -88,7 +88,9 @@ def command(arguments: Sequence[str], adapt: Callable[[RobotParts], Adapted] = a
         unused = unused_clauses(settings.link_spec(), [("to_operator", stream) for stream in sent])
         for text in unused:
             process.note(text)
-        cameras = Cameras(parts.scene, settings.cameras, process.note) if settings.cameras.on else None
+        cameras = None
+        if settings.cameras.on:
+            cameras = Cameras(parts.scene, settings.cameras, process.note, sent=drivers.pictures)
         if cameras is not None and settings.cameras.at_once:
             now_s = loop.clock.now()
             cameras.update(now_s, now_s, (), expected=True)

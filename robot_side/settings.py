@@ -117,6 +117,9 @@ class RobotSettings(PaperFlags, SideOptions):
     """Only in a TOML file: limits of the simulated arm that [arm.limits] does not know, for experiments."""
     objects: Annotated[str | None, tyro.conf.arg(metavar="tcp://HOST:PORT")] = None
     """Address at which your perception process connects, instead of a simulated camera (docs/drivers.md)."""
+    pictures: Annotated[str | None, tyro.conf.arg(metavar="tcp://HOST:PORT")] = None
+    """Address at which your camera process connects (docs/drivers.md). The views that it sends replace the simulated
+    ones."""
     perception: Annotated[str | None, tyro.conf.arg(metavar="NAME|FILE.py")] = None
     """Perception of your own in this process: a function that gets the simulated camera and returns the one to use
     (docs/python.md)."""
@@ -166,6 +169,8 @@ class RobotSettings(PaperFlags, SideOptions):
             raise ValueError(
                 "--insecure and --keys exclude each other, as keys decide who may connect; valid: only one of them"
             )
+        if self.pictures is not None and not self.cameras.on:
+            raise ValueError("--pictures and --no-cameras exclude each other; valid: one of them")
         require_law(self.law)
         if self.perception is not None:
             require_name("perception", self.perception, ())

@@ -9,14 +9,17 @@ import select
 import sys
 from typing import TYPE_CHECKING
 
+import msgspec
 import numpy as np
+import numpy.typing as npt
 
 from common.clock import MonotonicClock
 from common.companion.channel import Channel
 from common.companion.process import companion_channel
+from common.protocol.codec import VIEW_MAXIMUM_BYTES
 from common.protocol.view_messages import ViewName
 from common.realtime.priority import lower_priority
-from robot_side.viewing.exchange import Order, Picture, Ready, Refusal, Setup, decode_to_companion, encode
+from robot_side.viewing.exchange import Order, Picture, Ready, Refusal, Setup, Undecodable, decode_to_companion, encode
 from robot_side.viewing.off_screen import BACKENDS, REMEDY, silenced, trouble_with
 
 if TYPE_CHECKING:
@@ -25,6 +28,9 @@ if TYPE_CHECKING:
 
 _NICENESS = 0
 """Niceness of this process: an ordinary program's, not the sides', which would put pictures before the browser"""
+
+_MOST_BYTES = VIEW_MAXIMUM_BYTES - 4096
+"""Largest encoded picture: a view message beside its header"""
 
 
 def main() -> None:
@@ -36,14 +42,12 @@ def main() -> None:
         if len(troubles) < len(BACKENDS):
             again = [sys.executable, "-P", "-m", "robot_side.viewing.companion", sys.argv[1], *troubles]
             os.execv(sys.executable, again)  # noqa: S606
-        _refuse(channel, f"{'; '.join(troubles)}; to mend it: {REMEDY}")
-        return
     try:
         import simplejpeg  # noqa: F401, PLC0415  # may be missing
     except ImportError as error:
         _refuse(channel, f"{error}; install it in the clone: pip install '.[robot]'")
         return
-    _serve(channel)
+    _serve(channel, f"{'; '.join(troubles)}; to mend it: {REMEDY}" if trouble is not None else "")
 
 
 def _refuse(channel: Channel, reason: str) -> None:
@@ -53,7 +57,8 @@ def _refuse(channel: Channel, reason: str) -> None:
         channel.flush()
 
 
-def _serve(channel: Channel) -> None:
+def _serve(channel: Channel, unrendered: str) -> None:
+    """Serve orders. unrendered: why nothing can be rendered; empty if it can."""
     drawing: _Drawing | None = None
     clock = MonotonicClock()
     while not channel.ended:
@@ -62,10 +67,22 @@ def _serve(channel: Channel) -> None:
             began_s = clock.now()
             message = decode_to_companion(payload)
             if isinstance(message, Setup):
-                drawing = _Drawing(message)
+                if unrendered and not message.sent:
+                    _refuse(channel, unrendered)
+                    return
+                drawing = _Drawing(message, unrendered)
                 channel.send(encode(drawing.ready))
             elif drawing is not None:
-                (height, width, _), content, number, whole = drawing.picture(message)
+                try:
+                    source = drawing.source(message)
+                except ValueError as error:
+                    channel.send(encode(Undecodable(message.view, str(error))))
+                    continue
+                (height, width, _), content, number, whole = drawing.picture(message, source)
+                if len(content) > _MOST_BYTES:
+                    reason = f"it takes {len(content)} bytes encoded; valid: up to {_MOST_BYTES}"
+                    channel.send(encode(Undecodable(message.view, reason)))
+                    continue
                 place = message.view, message.captured_s, width, height
                 channel.send(encode(Picture(*place, content, clock.now() - began_s, number, whole)))
 
@@ -78,19 +95,29 @@ def _renderer_of(setup: Setup) -> "Renderer":
 
 
 class _Drawing:
-    def __init__(self, setup: Setup) -> None:
-        self._renderer = _renderer_of(setup)
+    def __init__(self, setup: Setup, unrendered: str) -> None:
+        self._renderer = None if unrendered else _renderer_of(setup)
         self._h264: dict[ViewName, H264] = {}
-        self.ready = _tried() if setup.h264 else Ready(h264=False)
+        ready = _tried() if setup.h264 else Ready(h264=False)
+        self.ready = msgspec.structs.replace(ready, unrendered=unrendered)
 
-    def picture(self, order: Order) -> tuple[tuple[int, ...], bytes, int, bool]:
-        """Render a picture; return its shape, bytes, number (0 for JPEG), and whether it can be shown by itself."""
+    def source(self, order: Order) -> npt.NDArray[np.uint8]:
+        """Return the picture to encode, RGB (height, width, 3); ValueError if there is none."""
+        if order.sent is not None:
+            from robot_side.viewing.sent_decoding import decode_sent  # noqa: PLC0415  # needs simplejpeg
+
+            return decode_sent(order.sent)
+        if self._renderer is None:
+            raise ValueError(self.ready.unrendered)
+        return self._renderer.picture(order.view, order.positions, order.mocap_poses)
+
+    def picture(self, order: Order, picture: npt.NDArray[np.uint8]) -> tuple[tuple[int, ...], bytes, int, bool]:
+        """Encode a picture; return its shape, bytes, number (0 for JPEG), and whether it can be shown by itself."""
         import simplejpeg  # noqa: PLC0415  # may be missing, which `main` reports
 
-        from robot_side.viewing.rendering import halved  # noqa: PLC0415  # after the choice of a backend
-
-        picture = self._renderer.picture(order.view, order.positions, order.mocap_poses)
         if order.halved:
+            from robot_side.viewing.halving import halved  # noqa: PLC0415  # seldom needed
+
             picture = halved(picture)
         if order.h264:
             from robot_side.viewing.h264 import H264  # noqa: PLC0415  # an extra

@@ -1,10 +1,10 @@
 """Messages between the robot side and its rendering process.
 
 robot side ── Setup, Order ──▶ companion
-robot side ◀── Ready, Picture, Refusal ── companion
+robot side ◀── Ready, Picture, Undecodable, Refusal ── companion
 """
 
-from typing import Final
+from typing import Final, Literal
 
 import msgspec
 
@@ -22,6 +22,17 @@ class Setup(msgspec.Struct, frozen=True, tag=True):
     viewpoints: dict[ViewName, Viewpoint]
     h264: bool = False
     """Whether pictures in H.264 may be ordered"""
+    sent: bool = False
+    """Whether pictures may be sent, which need no renderer"""
+
+
+class Sent(msgspec.Struct, frozen=True):
+    """Picture from a camera, to be encoded instead of a rendered one; its bytes are a stranger's."""
+
+    width: int
+    height: int
+    format: Literal["jpeg", "rgb8"]
+    content: bytes
 
 
 class Order(msgspec.Struct, frozen=True, tag=True):
@@ -41,6 +52,8 @@ class Order(msgspec.Struct, frozen=True, tag=True):
     """Whether the picture is H.264; else JPEG"""
     whole: bool = False
     """Whether to make a picture that needs no other, because a viewer lacks the picture before this one"""
+    sent: Sent | None = None
+    """Picture to be encoded; None: the state is rendered"""
 
 
 class Ready(msgspec.Struct, frozen=True, tag=True):
@@ -49,6 +62,8 @@ class Ready(msgspec.Struct, frozen=True, tag=True):
     h264: bool
     trouble: str = ""
     """Reason why the installed PyAV makes no H.264"""
+    unrendered: str = ""
+    """Reason why only sent pictures are served, and what to do about it"""
 
 
 class Picture(msgspec.Struct, frozen=True, tag=True):
@@ -68,6 +83,13 @@ class Picture(msgspec.Struct, frozen=True, tag=True):
     """Whether the picture can be shown without another picture"""
 
 
+class Undecodable(msgspec.Struct, frozen=True, tag=True):
+    """Answer to an order with a sent picture that cannot be decoded."""
+
+    view: ViewName
+    reason: str
+
+
 class Refusal(msgspec.Struct, frozen=True, tag=True):
     """Refusal of all orders, with the reason and what to do about it."""
 
@@ -76,4 +98,4 @@ class Refusal(msgspec.Struct, frozen=True, tag=True):
 
 encode: Final = msgspec.msgpack.Encoder().encode
 decode_to_companion: Final = msgspec.msgpack.Decoder(Setup | Order).decode
-decode_from_companion: Final = msgspec.msgpack.Decoder(Ready | Picture | Refusal).decode
+decode_from_companion: Final = msgspec.msgpack.Decoder(Ready | Picture | Undecodable | Refusal).decode

@@ -1,25 +1,34 @@
 """Robot side's end of rendering: it orders pictures from a companion process and takes them, and never waits."""
 
 import math
-import threading
 from collections.abc import Callable, Collection
-from typing import Final, Protocol
+from typing import Final
 
 import mujoco  # type: ignore[import-untyped]
 import numpy as np
 
-from common.companion.channel import MESSAGE_LIMIT_BYTES, Channel
-from common.companion.process import Companion
+from common.companion.channel import MESSAGE_LIMIT_BYTES
 from common.protocol.messages import Header
 from common.protocol.view_messages import VIEW_NAMES, VideoFrame, VideoStep, ViewName
 from robot_side.drivers.mujoco.scene import Scene
 from robot_side.drivers.mujoco.viewpoints import viewpoints
-from robot_side.viewing.exchange import Order, Picture, Ready, Refusal, Setup, decode_from_companion, encode
+from robot_side.viewing.exchange import (
+    Order,
+    Picture,
+    Ready,
+    Refusal,
+    Sent,
+    Setup,
+    Undecodable,
+    decode_from_companion,
+    encode,
+)
 from robot_side.viewing.losses import Losses
 from robot_side.viewing.picture_rate_control import PictureRateControl, Step
+from robot_side.viewing.sent_pictures import SentPictures
 from robot_side.viewing.settings import CamerasSettings
+from robot_side.viewing.starting import Renders, Start, start_beside
 
-MODULE: Final = "robot_side.viewing.companion"
 IDLE_S: Final = 60.0
 """Time without use, in seconds, after which a companion is ended"""
 RETRY_S: Final = 5.0
@@ -43,38 +52,6 @@ def saved_model(scene: Scene) -> bytes:
     return saved.tobytes()
 
 
-class Renders(Protocol):
-    """Part of the interface of a `Companion` that this module uses."""
-
-    channel: Channel
-
-    @property
-    def running(self) -> bool:
-        """Whether the process has not ended yet"""
-        ...
-
-    def close(self, limit_s: float = ...) -> bool:
-        """End the process."""
-        ...
-
-
-Start = Callable[[Callable[[Renders | str], None]], None]
-"""Function that starts a companion. It passes the companion, or the reason of a failure, to its argument, at once or
-later."""
-
-
-def start_beside(done: Callable[[Renders | str], None]) -> None:
-    """Start a companion in a thread, as starting a process takes milliseconds."""
-
-    def begin() -> None:
-        try:
-            done(Companion(MODULE))
-        except OSError as error:
-            done(f"no process can be started: {error.strerror}")
-
-    threading.Thread(target=begin, daemon=True).start()
-
-
 class Cameras:
     """Keeper of one order of each wanted view; starts the companion process when a viewer is there or expected."""
 
@@ -84,12 +61,19 @@ class Cameras:
         settings: CamerasSettings,
         note: Callable[[str], None],
         start: Start = start_beside,
+        sent: SentPictures | None = None,
     ) -> None:
-        """note: called for each fault with one line, which includes what to do about it."""
+        """note: called for each fault with one line, which includes what to do about it.
+
+        sent: pictures of real cameras, each of which replaces a rendered view from its first picture on.
+        """
+        self._sent = sent
+        self._renders = True
+        """Whether views can be rendered, as far as known; else only sent ones can be shown"""
         self._h264 = settings.codec == "auto"
         """Whether the companion makes H.264; taken to be so until it says otherwise"""
         shape = settings.width, settings.height
-        self._setup = encode(Setup(saved_model(scene), *shape, viewpoints(scene), self._h264))
+        self._setup = encode(Setup(saved_model(scene), *shape, viewpoints(scene), self._h264, sent is not None))
         self.picture_rate_control = PictureRateControl(settings.rate_hz, settings.quality)
         """Controller of the pictures' rate, quality and size"""
         self.starts = 0
@@ -129,6 +113,17 @@ class Cameras:
     def busy(self, view: ViewName) -> bool:
         """Return whether an order of `view` is under way."""
         return view in self._ordered_s
+
+    def hear(self, now_s: float, *, watched: bool) -> None:
+        """Take pictures that have been sent. watched: whether somebody looks."""
+        if self._sent is not None:
+            self._sent.update(now_s, watched=watched)
+
+    def has_news(self, view: ViewName) -> bool:
+        """Return whether a new picture of `view` can be ordered: always if it is rendered."""
+        if self._sent is not None and self._sent.sends(view):
+            return self._sent.fresh(view)
+        return self._renders
 
     def makes_h264(self, lacks: tuple[int, int] | None, now_s: float) -> bool:
         """Return whether pictures are H.264 for viewers that lack the pictures `lacks` (see `Watch`).
@@ -210,7 +205,12 @@ class Cameras:
     ) -> None:
         if view in self._ordered_s or _SETUP in self._ordered_s:
             return
-        data = self._data
+        data, sent = self._data, None
+        if self._sent is not None and self._sent.sends(view):
+            if (picture := self._sent.take(view)) is None:
+                return
+            captured_s = picture.captured_s
+            sent = Sent(picture.width, picture.height, picture.format, picture.content)
         mocap = np.concatenate([data.mocap_pos, data.mocap_quat], axis=1).tobytes() if len(data.mocap_pos) else b""
         step, h264 = self.picture_rate_control.step, self.makes_h264(lacks, now_s)
         number, came_s = self._whole.get(view, (0, -math.inf))
@@ -220,7 +220,7 @@ class Cameras:
             self._losses.note(view, number, now_s)
         whole = h264 and lost and now_s - came_s >= _WHOLE_S
         positions = data.qpos.tobytes()
-        order = Order(view, captured_s, positions, mocap, step.quality, step.halved, h264, whole)
+        order = Order(view, captured_s, positions, mocap, step.quality, step.halved, h264, whole, sent)
         if companion.channel.send(encode(order)):
             self._ordered_s[view], self._ordered_as[view] = now_s, step
 
@@ -236,6 +236,10 @@ class Cameras:
                 self._ready(message)
                 continue
             self._ordered_s.pop(message.view, None)
+            if isinstance(message, Undecodable):
+                if self._sent is not None:
+                    self._sent.refuse(message.view, message.reason, now_s)
+                continue
             self._failures, self._has_worked = 0, True
             if message.number and message.whole:
                 # Whole pictures are rare, and ten times as large as the following ones: not counted.
@@ -252,6 +256,9 @@ class Cameras:
     def _ready(self, message: Ready) -> None:
         self._ordered_s.pop(_SETUP, None)
         self._h264 &= message.h264
+        if message.unrendered and self._renders:
+            self._renders = False
+            self._note(f"cameras: only pictures that are sent are shown: {message.unrendered}")
         if message.trouble and not self._has_worked:
             self._note(
                 f"cameras: pictures are JPEG, with ten times the bytes, as PyAV makes no H.264: {message.trouble}"

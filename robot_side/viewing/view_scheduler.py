@@ -159,6 +159,7 @@ class ViewScheduler:
         if cameras is None:
             return []
         views = len(looked_at & set(VIEW_NAMES))
+        cameras.hear(now_s, watched=views > 0)
         # Recorded pictures are JPEG: replay and export begin anywhere.
         lacks = None if self._always else self._session.watchers.lacks(now_s)
         h264 = cameras.makes_h264(lacks, now_s)
@@ -169,8 +170,9 @@ class ViewScheduler:
         self._late &= looked_at
         for name in VIEW_NAMES:
             if cameras.works and (name in due or name in self._late):
-                if cameras.busy(name) or full:
-                    self._counts[name]["behind"] += name in due
+                behind = cameras.busy(name) or full
+                if behind or not cameras.has_news(name):
+                    self._counts[name]["behind"] += behind and name in due
                     self._late.add(name)
                 else:
                     self._late.discard(name)

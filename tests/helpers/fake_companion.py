@@ -6,8 +6,9 @@ from collections.abc import Callable
 from common.companion.channel import Channel
 from robot_side.drivers.mujoco.scene import Scene
 from robot_side.viewing.exchange import Order, Picture, Ready, Refusal, Setup, decode_to_companion, encode
-from robot_side.viewing.pictures import Cameras, Renders
+from robot_side.viewing.pictures import Cameras
 from robot_side.viewing.settings import CamerasSettings
+from robot_side.viewing.starting import Renders
 
 
 class FakeCompanion:

@@ -53,7 +53,8 @@ ARROWS = """
         robot_side/surroundings/kinds
     robot_side/gripper: common common/files robot_side/arm robot_side/overlap/meshes robot_side/surroundings
     robot_side/tick: common common/protocol robot_side/arm robot_side/surroundings
-    robot_side/drivers/remote: common common/sockets/door common/timing robot_side/arm robot_side/overlap/meshes
+    robot_side/drivers/remote: common common/protocol common/sockets/door common/timing robot_side/arm
+        robot_side/overlap/meshes
         robot_side/surroundings
     robot_side/laws: common common/files common/protocol robot_side/arm robot_side/enlargement robot_side/field
         robot_side/laws/paper_settings.py robot_side/surroundings robot_side/tick

@@ -27,6 +27,7 @@ from common.sockets.door.messages import (
     Listening,
     Owner,
     Ready,
+    Take,
     ToDriver,
     ToPeer,
     ToViewers,
@@ -76,6 +77,10 @@ class DriverPort:
     def send(self, peer: bytes, payload: bytes) -> bool:
         """Pass a message on to the door; return False, and count it in `dropped`, if the door takes none now."""
         return self._door.ask(ToDriver(self._flag, peer, payload))
+
+    def ask(self) -> bool:
+        """Ask a port that passes on request for its newest messages; return False if the door takes nothing now."""
+        return self._door.ask(Take(self._flag))
 
     def wait(self, timeout_s: float) -> float:
         """Wait for any message, at most `timeout_s`; return the time on our monotonic clock."""

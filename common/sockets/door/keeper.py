@@ -20,6 +20,7 @@ from common.errors import ConfigurationError
 from common.realtime.priority import raise_descriptor_limit, raise_priority
 from common.sockets.authentication import RobotKeys
 from common.sockets.door.admission import Admission
+from common.sockets.door.held import Held
 from common.sockets.door.messages import (
     ROOM_BYTES,
     Asked,
@@ -36,13 +37,14 @@ from common.sockets.door.messages import (
     Owner,
     Ready,
     Said,
+    Take,
     ToDriver,
     ToPeer,
     ToViewers,
     decode_asked,
     encode,
 )
-from common.sockets.driver_port import DriverPort
+from common.sockets.driver_port import DriverPort, Received
 from common.sockets.robot import RobotSockets
 from common.sockets.tcp_figures import TcpFigures
 
@@ -91,6 +93,7 @@ class Keeper:
                 )
                 for flag, one in settings.drivers.items()
             }
+        self._held = {flag: Held() for flag, one in settings.drivers.items() if one.on_request}
         notes = [] if self._keys is None else self._keys.notes()
         self._say(Ready({flag: port.endpoint for flag, port in self._drivers.items()}, notes))
         if settings.listens:
@@ -106,13 +109,17 @@ class Keeper:
                 for peer, payload in admission.admitted(self._sockets.receive(), self._owner, now_s):
                     self._say(FromPeer(peer, payload))
             for flag, port in self._drivers.items():
-                for received in port.receive():
-                    self._say(FromDriver(flag, *received))
+                received = port.receive()
+                self._pass_on(flag, self._held[flag].add(received) if flag in self._held else received)
             for payload in channel.receive():
                 self._do(decode_asked(payload))
             if now_s >= self._watch_s:
                 self._watch_s = now_s + _WATCH_S
                 self._watch(now_s)
+
+    def _pass_on(self, flag: str, received: Sequence[Received]) -> None:
+        for message in received:
+            self._say(FromDriver(flag, *message))
 
     def _bound(self) -> RobotSockets:
         settings = self._settings
@@ -141,6 +148,8 @@ class Keeper:
         match asked:
             case ToDriver(flag, peer, payload):
                 self._drivers[flag].send(peer, payload)
+            case Take(flag):
+                self._pass_on(flag, self._held[flag].ask())
             case Owner(peer):
                 self._owner = peer
             case Close():

@@ -22,6 +22,8 @@ class DriverSettings(Struct, frozen=True):
     """Largest valid message"""
     bytes_per_s: float
     """Budget of each connection"""
+    on_request: bool = False
+    """Whether only the newest messages pass on, and only after `Take`"""
 
 
 class DoorSettings(Struct, frozen=True):
@@ -140,8 +142,14 @@ class Close(Struct, frozen=True, array_like=True, tag=6):
     """Send the last figures, then end."""
 
 
+class Take(Struct, frozen=True, array_like=True, tag=7):
+    """Pass on the newest messages of a port that passes on request, now or as soon as there are any."""
+
+    flag: str
+
+
 Said = FromPeer | FromDriver | Ready | Listening | Failed | Figures
-Asked = ToPeer | ToViewers | ToDriver | Owner | Listen | Close
+Asked = ToPeer | ToViewers | ToDriver | Owner | Listen | Close | Take
 
 encode: Final = msgspec.msgpack.Encoder().encode
 decode_said: Final = msgspec.msgpack.Decoder(Said).decode

@@ -20,7 +20,8 @@ from robot_side.viewing.exchange import (
     decode_from_companion,
     encode,
 )
-from robot_side.viewing.pictures import MODULE, saved_model
+from robot_side.viewing.pictures import saved_model
+from robot_side.viewing.starting import MODULE
 
 _WIDTH, _HEIGHT, _QUALITY = 480, 320, 70
 _AWAY_M, _ABOVE_M, _FOVY_DEG = 0.55, 0.32, 34.0

@@ -1,4 +1,4 @@
-"""Ports of the settings --arm and --objects, and the wait for the first messages over these."""
+"""Ports of the settings --arm, --objects and --pictures, and the wait for the first messages over these."""
 
 from collections.abc import Callable
 from typing import Any, Final
@@ -14,32 +14,42 @@ from robot_side.drivers.remote.frame_message import FRAME_LIMIT_BYTES
 from robot_side.drivers.remote.messages import STATE_LIMIT_BYTES
 from robot_side.drivers.remote.objects import RemoteObjects
 from robot_side.surroundings.perceived import PerceivedObjects
+from robot_side.drivers.remote.picture_message import PICTURE_LIMIT_BYTES
+from robot_side.drivers.remote.pictures import RemotePictures
 
 _TURN_S: Final = 0.004
 _STATES_BYTES_PER_S: Final = 4e6
 _FRAMES_BYTES_PER_S: Final = 16e6
 """Budgets of a driver's states, 1000 a second, and of a perception, whose usual frames have some kilobytes"""
+_PICTURES_BYTES_PER_S: Final = 64e6
+"""Budget of a camera process: two views of 640 x 480 in rgb8 at 30 Hz"""
 _AWAITED: Final = {"--arm": "an arm's driver", "--objects": "a process that perceives objects"}
 
 
-def driver_ports(arm: str | None, objects: str | None) -> dict[str, DriverSettings]:
+def driver_ports(arm: str | None, objects: str | None, pictures: str | None = None) -> dict[str, DriverSettings]:
     """Return the settings of the ports at which programs connect, keyed by flag."""
     found: dict[str, DriverSettings] = {}
     if arm is not None:
         found["--arm"] = DriverSettings(arm, "driver", STATE_LIMIT_BYTES, _STATES_BYTES_PER_S)
     if objects is not None:
         found["--objects"] = DriverSettings(objects, "perception", FRAME_LIMIT_BYTES, _FRAMES_BYTES_PER_S)
+    if pictures is not None:
+        limits = PICTURE_LIMIT_BYTES, _PICTURES_BYTES_PER_S
+        found["--pictures"] = DriverSettings(pictures, "perception", *limits, on_request=True)
     return found
 
 
 class ConnectedDrivers:
-    """Programs that connect: the arm's driver and the perception process, if the settings name a port for them."""
+    """Programs that connect at the ports of the settings: they drive the arm, perceive objects, or send pictures."""
 
     def __init__(self, door: Door, note: Callable[[str], None]) -> None:
         """door: made with the settings of `driver_ports`. note: called with lines that people read."""
         self._note, self._ports = note, door.ports
         self._arm: RemoteArm | None = None
         self._objects: RemoteObjects | None = None
+        port = self._ports.get("--pictures")
+        self.pictures = None if port is None else RemotePictures(port, note)
+        """Source of the pictures that are sent to --pictures; None without it"""
 
     @property
     def has_arm(self) -> bool:
@@ -90,4 +100,8 @@ class ConnectedDrivers:
     def summary(self) -> dict[str, Any]:
         """Return the numbers of accepted and rejected messages of each port; None for a port that is not used."""
         arm = None if self._arm is None else self._arm.session.summary()
-        return {"arm": arm, "objects": None if self._objects is None else self._objects.summary()}
+        return {
+            "arm": arm,
+            "objects": None if self._objects is None else self._objects.summary(),
+            "pictures": None if self.pictures is None else self.pictures.summary(),
+        }

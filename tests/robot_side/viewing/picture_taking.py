@@ -24,8 +24,9 @@ from robot_side.viewing.exchange import (
     decode_from_companion,
     encode,
 )
-from robot_side.viewing.pictures import MODULE, saved_model
+from robot_side.viewing.pictures import saved_model
 from robot_side.viewing.rendering import placed
+from robot_side.viewing.starting import MODULE
 from tests.helpers.machines.waiting import LIMIT_S
 
 WIDTH, HEIGHT = 320, 240

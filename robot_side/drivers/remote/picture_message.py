@@ -1,0 +1,78 @@
+"""Message of a camera process to the robot side, and the answers (docs/drivers.md): maps in MessagePack."""
+
+from typing import Annotated, Final, Literal
+
+import msgspec
+from msgspec import UNSET, Meta, Struct, UnsetType
+
+from common.errors import RemoteProtocolError
+from common.protocol.view_messages import ViewName
+from robot_side.drivers.remote.messages import decoded
+
+PICTURE_VERSION: Final = 1
+PICTURE_LIMIT_BYTES: Final = 1024 * 1024
+LEAST_PIXELS: Final = 16
+MOST_PIXELS: Final = 1920
+"""Limits of a picture's width and height"""
+_JPEG: Final = b"\xff\xd8\xff"
+_COLORS: Final = 3
+
+_Pixels = Annotated[int, Meta(ge=LEAST_PIXELS, le=MOST_PIXELS)]
+_Stamp = Annotated[float, Meta(ge=-1e12, le=1e12)]
+"""Time in s; beyond these limits a double no longer resolves milliseconds."""
+_Focal = Annotated[float, Meta(gt=0.0, le=1e5)]
+_Middle = Annotated[float, Meta(ge=-1e4, le=1e4)]
+
+
+class Intrinsics(Struct, frozen=True, forbid_unknown_fields=True):
+    """Pinhole of a camera, in pixels of the picture as it is sent: x to the right and y down, from the upper left."""
+
+    fx: _Focal
+    fy: _Focal
+    cx: _Middle
+    cy: _Middle
+
+
+class PictureMessage(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Picture of one view; its times are on the sender's clock. Its bytes are not decoded here."""
+
+    version: int
+    sequence: Annotated[int, Meta(ge=0, le=2**53)]
+    sent_s: _Stamp
+    taken_s: _Stamp
+    """Time at which the camera took the picture, no later than `sent_s`"""
+    echo_s: _Stamp | UnsetType | None = UNSET
+    """`sent_s` of the newest answer that the sender has read, None before the first; UNSET: it wants no answers"""
+    held_s: Annotated[float, Meta(ge=0.0, lt=1e6)] = 0.0
+    """Time from reading that answer to `sent_s`, in s"""
+    view: ViewName
+    width: _Pixels
+    height: _Pixels
+    format: Literal["jpeg", "rgb8"]
+    content: bytes = msgspec.field(name="bytes")
+    intrinsics: Intrinsics | None = None
+
+
+class PictureHeard(Struct, frozen=True):
+    """Answer to a picture whose sender echoes answers."""
+
+    version: int
+    sent_s: float
+    """Time of sending on the robot side's clock"""
+
+
+_DECODER: Final = msgspec.msgpack.Decoder(PictureMessage)
+
+
+def read_picture(payload: bytes) -> PictureMessage:
+    """Decode a message; RemoteProtocolError names an invalid field. Whether a JPEG is one is found out elsewhere."""
+    message = decoded(payload, _DECODER, PICTURE_VERSION)
+    if message.taken_s > message.sent_s:
+        raise RemoteProtocolError(f"taken_s = {message.taken_s}; valid: up to sent_s = {message.sent_s}")
+    size, expected = len(message.content), _COLORS * message.width * message.height
+    if message.format == "rgb8" and size != expected:
+        shape = f"{message.width} x {message.height} pixels"
+        raise RemoteProtocolError(f"bytes has {size} bytes; valid: {expected}, three for each of {shape} in rgb8")
+    if message.format == "jpeg" and not message.content.startswith(_JPEG):
+        raise RemoteProtocolError(f"bytes begins with {message.content[:3].hex()!r}; valid: 'ffd8ff' in format jpeg")
+    return message
