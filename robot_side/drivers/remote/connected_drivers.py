@@ -74,6 +74,8 @@ class ConnectedDrivers:
 
         meanwhile: called some 100 times a second.
         """
+        if self.pictures is not None:
+            self._note(f"pictures are taken at {self._ports['--pictures'].endpoint}")
         begin = {
             flag: part.begin if isinstance(part, RemoteArm) else part.exchange
             for flag, part in (("--arm", self._arm), ("--objects", self._objects))
