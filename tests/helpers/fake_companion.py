@@ -5,8 +5,9 @@ from collections.abc import Callable
 
 from common.companion.channel import Channel
 from robot_side.drivers.mujoco.scene import Scene
-from robot_side.viewing.exchange import Order, Picture, Ready, Refusal, Setup, decode_to_companion, encode
+from robot_side.viewing.exchange import Order, Picture, Ready, Refusal, Setup, Undecodable, decode_to_companion, encode
 from robot_side.viewing.pictures import Cameras
+from robot_side.viewing.sent_pictures import SentPictures
 from robot_side.viewing.settings import CamerasSettings
 from robot_side.viewing.starting import Renders
 
@@ -30,7 +31,7 @@ class FakeCompanion:
     def heard(self) -> list[Setup | Order]:
         return [decode_to_companion(payload) for payload in self.other.receive()]
 
-    def answer(self, message: Ready | Picture | Refusal) -> None:
+    def answer(self, message: Ready | Picture | Undecodable | Refusal) -> None:
         self.other.send(encode(message))
 
     def picture(self, order: Order, content: bytes = b"\xff\xd8", number: int = 0, *, whole: bool = True) -> None:
@@ -42,13 +43,13 @@ class FakeCompanion:
 class Desk:
     """The robot side's `Cameras`, the stand-in companions that they have started, and their notes to a person."""
 
-    def __init__(self, scene: Scene, settings: CamerasSettings | None = None) -> None:
+    def __init__(self, scene: Scene, settings: CamerasSettings | None = None, sent: SentPictures | None = None) -> None:
         self.scene = scene
         self.ready = Ready(h264=True)
         self.companions: list[FakeCompanion] = []
         self.notes: list[str] = []
         self.fails_to_start: str | None = None
-        self.cameras = Cameras(scene, settings or CamerasSettings(), self.notes.append, self._start)
+        self.cameras = Cameras(scene, settings or CamerasSettings(), self.notes.append, self._start, sent)
 
     def _start(self, done: Callable[[Renders | str], None]) -> None:
         if self.fails_to_start is not None:

@@ -12,7 +12,7 @@ from robot_side.viewing.exchange import Sent
 from robot_side.viewing.sent_decoding import MOST_SCANS, decode_sent
 
 RAMP = np.ascontiguousarray(np.broadcast_to(np.linspace(0, 255, 64, dtype=np.uint8)[None, :, None], (48, 64, 3)))
-JPEG = simplejpeg.encode_jpeg(RAMP, 90)
+JPEG: bytes = simplejpeg.encode_jpeg(RAMP, 90)
 
 
 def test_both_formats_show_the_same_picture() -> None:

@@ -39,7 +39,12 @@ class Camera:
         """Send a picture that leaves `way_s` before now. `fields` replace those of the message; None leaves one out."""
         self.sequence += 1
         sent_s = self.now_s - way_s + AHEAD_S
-        message = {"version": 1, "sequence": self.sequence, "sent_s": sent_s, "taken_s": sent_s - exposed_s}
+        message: dict[str, Any] = {
+            "version": 1,
+            "sequence": self.sequence,
+            "sent_s": sent_s,
+            "taken_s": sent_s - exposed_s,
+        }
         message |= {"view": "first_person", "width": 640, "height": 480, "format": "jpeg", "bytes": JPEG} | fields
         whole = {name: value for name, value in message.items() if value is not None}
         self._sent.append((peer, msgpack.packb(whole), self.now_s))
