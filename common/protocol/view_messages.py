@@ -84,7 +84,7 @@ class Shape(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=
 
 
 class Eye(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
-    """Viewpoint of a view at the start: of the first-person view in the tool frame, of the overview in the world's."""
+    """Viewpoint of a view: of the first-person view in the tool frame, of the overview in the world's."""
 
     position_m: Vector3
     forward: Vector3
@@ -93,6 +93,10 @@ class Eye(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=Tr
     """Unit vector, orthogonal to `forward`"""
     fovy_deg: float
     """Angle from the picture's lower edge to its upper one"""
+    stretch: float = 1.0
+    """How much wider a real camera's picture shows things than high; 1 for square pixels"""
+    middle: tuple[float, float] = (0.0, 0.0)
+    """Where the picture shows what is straight ahead: right of and above its centre, in half heights"""
 
 
 class Near(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
@@ -120,9 +124,10 @@ class SceneShapes(Message, frozen=True, tag="shapes"):
     """(objects, 7) float32, rows as in SceneState: poses of all objects, for those that SceneState leaves out. Empty if
     SceneState has all of them"""
     eye: Eye | None = None
-    """Viewpoint of the first-person view in the tool's frame; None without pictures"""
+    """Viewpoint of the first-person view in the tool's frame; None without pictures, and for a real camera whose mount
+    or intrinsics are unknown"""
     overview_eye: Eye | None = None
-    """Viewpoint of the overview in the world frame; None without pictures, and for a camera that moves"""
+    """Viewpoint of the overview in the world frame; None as for `eye`, and for a camera that moves"""
 
     def __post_init__(self) -> None:
         if len(self.object_poses) not in (0, _POSE_BYTES * len(self.objects)):

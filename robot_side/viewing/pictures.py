@@ -9,7 +9,7 @@ import numpy as np
 
 from common.companion.channel import MESSAGE_LIMIT_BYTES
 from common.protocol.messages import Header
-from common.protocol.view_messages import VIEW_NAMES, VideoFrame, VideoStep, ViewName
+from common.protocol.view_messages import VIEW_NAMES, Eye, VideoFrame, VideoStep, ViewName
 from robot_side.drivers.mujoco.scene import Scene
 from robot_side.drivers.mujoco.viewpoints import viewpoints
 from robot_side.viewing.exchange import (
@@ -25,7 +25,7 @@ from robot_side.viewing.exchange import (
 )
 from robot_side.viewing.losses import Losses
 from robot_side.viewing.picture_rate_control import PictureRateControl, Step
-from robot_side.viewing.sent_pictures import SentPictures
+from robot_side.viewing.sent_pictures import SentPictures, sent_eyes
 from robot_side.viewing.settings import CamerasSettings
 from robot_side.viewing.starting import Renders, Start, start_beside
 
@@ -67,7 +67,7 @@ class Cameras:
 
         sent: pictures of real cameras, each of which replaces a rendered view from its first picture on.
         """
-        self._sent = sent
+        self._sent, self._mounts = sent, settings.mount
         self._renders = True
         """Whether views can be rendered, as far as known; else only sent ones can be shown"""
         self._h264 = settings.codec == "auto"
@@ -124,6 +124,10 @@ class Cameras:
         if self._sent is not None and self._sent.sends(view):
             return self._sent.fresh(view)
         return self._renders
+
+    def sent_eyes(self) -> dict[ViewName, Eye | None]:
+        """Return the viewpoint of each view that is sent, as `sent_eyes` does."""
+        return {} if self._sent is None else sent_eyes(self._sent, self._mounts)
 
     def makes_h264(self, lacks: tuple[int, int] | None, now_s: float) -> bool:
         """Return whether pictures are H.264 for viewers that lack the pictures `lacks` (see `Watch`).

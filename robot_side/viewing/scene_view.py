@@ -1,7 +1,7 @@
 """Messages with the perceived scene for viewers: shapes, poses and the law's results."""
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Final
 
@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from common.arrays import FloatArray, IntArray
 from common.protocol.codec import VIEW_MAXIMUM_BYTES, Prepared
 from common.protocol.messages import Header
-from common.protocol.view_messages import EnlargementTerms, Eye, Near, SceneShapes, SceneState, Shape
+from common.protocol.view_messages import EnlargementTerms, Eye, Near, SceneShapes, SceneState, Shape, ViewName
 from common.roles import ROLES, Role
 from robot_side.drivers.mujoco.kinematics import MujocoKinematics
 from robot_side.surroundings.perceived import PerceivedObjects
@@ -83,7 +83,8 @@ class SceneView:
         self._overlaps_m3: dict[Trigger, Overlaps] = {}
         """Newest overlaps along each trigger, which several messages tell"""
         self._next_overlaps_s = -math.inf
-        self._surroundings, self._eyes = surroundings, (eye, overview_eye)
+        self._surroundings = surroundings
+        self._eyes: dict[ViewName, Eye | None] = {"first_person": eye, "overview": overview_eye}
         self._links: tuple[tuple[Shape, ...], int] | None = None
         self._base: PerceivedObjects | None = None
         """Objects as they were when the shapes were made"""
@@ -100,6 +101,11 @@ class SceneView:
         if outdated := self._model.update(objects):
             self._next_overlaps_s = -math.inf
         return outdated
+
+    def look_from(self, eyes: Mapping[ViewName, Eye | None]) -> bool:
+        """Take viewpoints, which replace those of the same views; return whether the shapes are outdated by them."""
+        before, self._eyes = self._eyes, {**self._eyes, **eyes}
+        return self._eyes != before
 
     def begin_shapes(self, header: Header, situation: Situation) -> None:
         """Begin to make SceneShapes anew, with the objects nearest to the tool first."""
@@ -218,8 +224,9 @@ class SceneView:
             yield
         self.version += 1
         self._base, self.left_out = objects, left_out
+        eyes = self._eyes["first_person"], self._eyes["overview"]
         said = SceneShapes(
-            header, self.version, model.links, model.objects, tuple(shapes), left_out, _row_bytes(poses), *self._eyes
+            header, self.version, model.links, model.objects, tuple(shapes), left_out, _row_bytes(poses), *eyes
         )
         self.shapes = Prepared(said)
         self.shapes_bytes = len(self.shapes.under(header))

@@ -2,7 +2,8 @@
 
 from typing import Literal, Protocol
 
-from common.protocol.view_messages import ViewName
+from common.protocol.view_messages import VIEW_NAMES, Eye, ViewName
+from robot_side.viewing.mount import MountSettings, Pinhole, mounted_eye
 
 
 class SentPicture(Protocol):
@@ -33,6 +34,11 @@ class SentPicture(Protocol):
         """Earliest possible time of capture, on our clock"""
         ...
 
+    @property
+    def intrinsics(self) -> Pinhole | None:
+        """Intrinsics of the camera; None if its sender does not say them"""
+        ...
+
 
 class SentPictures(Protocol):
     """Source of the newest picture of each view that is sent."""
@@ -53,6 +59,23 @@ class SentPictures(Protocol):
         """Return the newest picture of a view; None if it was taken before, or none has come."""
         ...
 
+    def newest(self, view: ViewName) -> SentPicture | None:
+        """Return the newest picture of a view, taken or not; None if none has come."""
+        ...
+
     def refuse(self, view: ViewName, text: str, now_s: float) -> None:
         """Refuse the picture of a view that was taken last: it cannot be decoded."""
         ...
+
+
+def sent_eyes(sent: SentPictures, mounts: MountSettings) -> dict[ViewName, Eye | None]:
+    """Return the viewpoint of each view that is sent; None if its mount or its intrinsics are unknown."""
+    eyes: dict[ViewName, Eye | None] = {}
+    for view in VIEW_NAMES:
+        if (picture := sent.newest(view)) is not None:
+            mount = mounts.overview if view == "overview" else mounts.first_person
+            pinhole = picture.intrinsics
+            eyes[view] = None
+            if mount is not None and pinhole is not None:
+                eyes[view] = mounted_eye(mount, pinhole, picture.width, picture.height)
+    return eyes

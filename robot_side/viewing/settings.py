@@ -1,12 +1,13 @@
 """Settings of the pictures of both views."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
 import tyro
 from msgspec import Meta
 
 from common.limits import check_limits
+from robot_side.viewing.mount import MountSettings
 
 _Pixels = Annotated[int, Meta(ge=16, le=4096)]
 
@@ -30,6 +31,9 @@ class CamerasSettings:
 
     at_once: bool = False
     """Start the drawing process together with the robot side, as somebody will soon watch."""
+
+    mount: Annotated[MountSettings, tyro.conf.Suppress] = field(default_factory=MountSettings)
+    """Only in a TOML file: where the cameras of --pictures are, for what the page draws over their pictures."""
 
     def __post_init__(self) -> None:
         check_limits(self)

@@ -66,7 +66,7 @@ class ViewScheduler:
         self._always = frozenset(always)
         self._ticks_s: deque[float] = deque(maxlen=250)
         self._ticks = TickFigures()
-        self._next_figures_s = self._next_look_s = -math.inf
+        self._next_figures_s = self._next_look_s = self._next_eyes_s = -math.inf
         self._next_s: dict[str, float] = {}
         self._late: set[str] = set()
         self._scene_hz = math.inf
@@ -189,6 +189,9 @@ class ViewScheduler:
     def _scene(self, now_s: float, taken_s: float, newest: tuple[Sensed, Situation], *, is_due: bool) -> list[Outgoing]:
         view, session, (sensed, situation) = self._scene_view, self._session, newest
         others = view.outdated(situation.objects)
+        if self._cameras is not None and now_s >= self._next_eyes_s and view.look_from(self._cameras.sent_eyes()):
+            # A camera that zooms would make the shapes anew with each of its pictures.
+            self._next_eyes_s, others = now_s + SHAPES_PERIOD_S, True
         if self._begun != session.watchers.scene_begun or others:
             self._begun = session.watchers.scene_begun
             self._next_shapes_s = now_s

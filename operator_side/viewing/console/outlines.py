@@ -42,7 +42,7 @@ def seen(points: Floats, eye_frame: Floats, eye: Eye) -> Floats | None:
         return None
     axes = np.column_stack((np.cross(forward, up), up))
     place: Floats = (from_eye @ axes) / (depth_m * np.tan(np.radians(0.5 * eye.fovy_deg)))[:, None]
-    return place
+    return place * (eye.stretch, 1.0) + eye.middle
 
 
 def outline(corners: Floats, eye_frame: Floats, eye: Eye) -> Box | None:

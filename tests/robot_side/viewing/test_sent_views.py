@@ -1,5 +1,6 @@
 """Views of which one is sent by a real camera, in virtual time, with a stand-in for the process that renders."""
 
+import math
 from collections.abc import Iterator
 from typing import Literal, NamedTuple
 
@@ -7,7 +8,10 @@ import pytest
 
 from common.protocol.view_messages import ViewName
 from robot_side.drivers.mujoco.scene import Scene, load_scene
+from robot_side.drivers.remote.picture_message import Intrinsics
 from robot_side.viewing.exchange import Ready, Sent, Undecodable
+from robot_side.viewing.mount import Mount, MountSettings
+from robot_side.viewing.settings import CamerasSettings
 from tests.helpers.fake_companion import Desk
 from tests.robot_side.viewing.view_table import TABLES, Table
 
@@ -22,20 +26,22 @@ class Shot(NamedTuple):
     width: int = 320
     height: int = 240
     format: Literal["jpeg", "rgb8"] = "jpeg"
+    intrinsics: Intrinsics | None = None
 
 
 class Shots:
     """Stand-in for the pictures that a camera process sends: those that the test puts here."""
 
     def __init__(self) -> None:
-        self.newest: dict[ViewName, Shot] = {}
+        self.fresh_ones: dict[ViewName, Shot] = {}
+        self.shown: dict[ViewName, Shot] = {}
         self.sent: set[ViewName] = set()
         self.refused: list[tuple[ViewName, str]] = []
         self.watched: list[bool] = []
         self.period_s = self._next_s = 0.0
 
-    def shoot(self, view: ViewName, captured_s: float) -> None:
-        self.newest[view] = Shot(captured_s)
+    def shoot(self, view: ViewName, captured_s: float, intrinsics: Intrinsics | None = None) -> None:
+        self.fresh_ones[view] = self.shown[view] = Shot(captured_s, intrinsics=intrinsics)
         self.sent.add(view)
 
     def update(self, now_s: float, *, watched: bool) -> None:
@@ -48,10 +54,13 @@ class Shots:
         return view in self.sent
 
     def fresh(self, view: ViewName) -> bool:
-        return view in self.newest
+        return view in self.fresh_ones
 
     def take(self, view: ViewName) -> Shot | None:
-        return self.newest.pop(view, None)
+        return self.fresh_ones.pop(view, None)
+
+    def newest(self, view: ViewName) -> Shot | None:
+        return self.shown.get(view)
 
     def refuse(self, view: ViewName, text: str, now_s: float) -> None:
         del now_s
@@ -116,6 +125,35 @@ def test_where_nothing_can_be_rendered_sent_views_are_shown_all_the_same(scene: 
     shots.shoot("overview", 0.1)
     assert desk.cameras.has_news("overview")
     desk.close()
+
+
+def test_shapes_come_anew_with_the_viewpoint_of_a_mounted_camera_and_not_with_each_picture_of_one_that_zooms(
+    shots: Shots,
+) -> None:
+    mounts = MountSettings(overview=Mount((0.5, 0.0, 1.5), (0.0, 1.0, 0.0, 0.0)))
+    table = Table(sent=shots, cameras=CamerasSettings(mount=mounts))
+    try:
+        table.watch(overview=True, scene=True)
+        table.run(1.0)
+        assert [shapes.overview_eye for shapes in table.shapes()] == [None]
+        for number in range(130):
+            shots.shoot("overview", table.now_s, Intrinsics(200.0, 200.0 + number, 160.0, 120.0))
+            table.run(0.03)
+        first, second, third = table.shapes()[:3]
+        assert first.version < second.version
+        eye = second.overview_eye
+        assert eye is not None
+        assert eye.position_m == (0.5, 0.0, 1.5)
+        assert eye.forward == pytest.approx((0.0, 0.0, -1.0))
+        assert eye.up == pytest.approx((0.0, 1.0, 0.0))
+        assert eye.fovy_deg == pytest.approx(math.degrees(2.0 * math.atan(120.0 / 200.0)))
+        assert third.header.sent_s - second.header.sent_s > 2.9
+        shots.shoot("first_person", table.now_s, Intrinsics(200.0, 200.0, 160.0, 120.0))
+        table.run(3.5)
+        assert table.shapes()[-1].eye is None  # Its mount is unknown.
+    finally:
+        TABLES.remove(table)
+        table.desk.close()
 
 
 @pytest.mark.parametrize(("period_s", "least", "most"), [(0.1, 27, 31), (0.005, 80, 91)])

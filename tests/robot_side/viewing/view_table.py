@@ -16,6 +16,7 @@ from robot_side.tick.outgoing import Outgoing, OutgoingStream
 from robot_side.viewing.exchange import Order
 from robot_side.viewing.scene_view import SceneView
 from robot_side.viewing.sent_pictures import SentPictures
+from robot_side.viewing.settings import CamerasSettings
 from robot_side.viewing.shapes import SceneModel
 from robot_side.viewing.view_scheduler import ViewScheduler
 from tests.helpers.fake_companion import Desk
@@ -37,11 +38,12 @@ class Table:
     left_bit_s: float = 1e9
     begins: bool = False
     sent: SentPictures | None = None
+    cameras: CamerasSettings | None = None
 
     def __post_init__(self) -> None:
         self.parts = build_parts(self.settings, 1, "clock")
         self.robot = RobotSide(self.parts)
-        self.desk = Desk(self.parts.scene, sent=self.sent)
+        self.desk = Desk(self.parts.scene, self.cameras, self.sent)
         self.lines: dict[str, DelayLine[Outgoing]] = {
             stream: DelayLine(self.link.profile("to_operator", stream))
             for stream in ("haptics", "telemetry", "video", "scene")
