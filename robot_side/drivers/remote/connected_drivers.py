@@ -21,8 +21,8 @@ _TURN_S: Final = 0.004
 _STATES_BYTES_PER_S: Final = 4e6
 _FRAMES_BYTES_PER_S: Final = 16e6
 """Budgets of a driver's states, 1000 a second, and of a perception, whose usual frames have some kilobytes"""
-_PICTURES_BYTES_PER_S: Final = 64e6
-"""Budget of a camera process: two views of 640 x 480 in rgb8 at 30 Hz"""
+_PICTURES_BYTES_PER_S: Final = 16e6
+"""Budget of a camera process: JPEG, or one view of 640 x 480 in rgb8 at 15 Hz"""
 _AWAITED: Final = {"--arm": "an arm's driver", "--objects": "a process that perceives objects"}
 
 

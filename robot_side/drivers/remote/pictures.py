@@ -28,7 +28,7 @@ UNBOUNDED_S: Final = 0.5
 _REFUSAL_PERIOD_S: Final = 1.0
 _WATCHED_PERIOD_S, _UNWATCHED_PERIOD_S = 1.0 / 60.0, 0.25
 """Periods in which the port is asked for pictures"""
-_BYTES_PER_S: Final = 32e6
+_BYTES_PER_S: Final = 16e6
 """Rate at which pictures are taken at most: those beyond are overtaken by newer ones at the port"""
 _ASK_AGAIN_S: Final = 0.25
 _UNANSWERED: Final = 50

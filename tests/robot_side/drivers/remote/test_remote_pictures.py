@@ -183,12 +183,12 @@ def test_a_silence_is_told_and_another_camera_may_take_the_place() -> None:
 
 @pytest.mark.parametrize(
     ("watched", "size", "asked"),
-    [(True, 20_000, 56), (False, 20_000, 4), (True, PICTURE_LIMIT_BYTES, 29), (True, 0, 4)],
+    [(True, 20_000, 56), (False, 20_000, 4), (True, PICTURE_LIMIT_BYTES, 15), (True, 0, 4)],
 )
 def test_pictures_are_asked_for_as_often_as_they_are_shown_and_large_ones_more_seldom(
     watched: bool, size: int, asked: int
 ) -> None:
-    """Nothing comes without a request, and after 1 ms with one. Some 60 or 4 a second, or 32 MB; unanswered: again."""
+    """Nothing comes without a request, and after 1 ms with one. Some 60 or 4 a second, or 16 MB; unanswered: again."""
     camera, before = Camera(), 0
     for _ in range(1000):
         camera.now_s += 0.001
