@@ -15,7 +15,7 @@ _LONGEST_REASON: Final = 200
 
 
 def decode_sent(sent: Sent) -> npt.NDArray[np.uint8]:
-    """Return a sent picture, RGB (height, width, 3); ValueError with the reason if it is not what it claims to be."""
+    """Return a sent picture, RGB (height, width, 3); ValueError with the reason if it is none, or of another size."""
     shape = sent.height, sent.width, 3
     if sent.format == "rgb8":
         return np.frombuffer(sent.content, np.uint8).reshape(shape)

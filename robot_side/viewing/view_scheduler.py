@@ -24,6 +24,7 @@ _SHAPES_SHARE: Final = 0.1
 _BACKLOG_S: Final = 0.03
 """Queueing delay, in seconds, above which no view is made, because it would be old on arrival"""
 _SEEN_TO_S: Final = 0.1
+_EYES_PERIOD_S: Final = 0.1
 _FIGURES_S: Final = 1.0
 
 
@@ -189,9 +190,11 @@ class ViewScheduler:
     def _scene(self, now_s: float, taken_s: float, newest: tuple[Sensed, Situation], *, is_due: bool) -> list[Outgoing]:
         view, session, (sensed, situation) = self._scene_view, self._session, newest
         others = view.outdated(situation.objects)
-        if self._cameras is not None and now_s >= self._next_eyes_s and view.look_from(self._cameras.sent_eyes()):
-            # A camera that zooms would make the shapes anew with each of its pictures.
-            self._next_eyes_s, others = now_s + SHAPES_PERIOD_S, True
+        if self._cameras is not None and now_s >= self._next_eyes_s:
+            new = view.look_from(self._cameras.sent_eyes())
+            others = others or new
+            # Shapes are large: a camera that zooms does not have them sent with each picture.
+            self._next_eyes_s = now_s + (SHAPES_PERIOD_S if new else _EYES_PERIOD_S)
         if self._begun != session.watchers.scene_begun or others:
             self._begun = session.watchers.scene_begun
             self._next_shapes_s = now_s

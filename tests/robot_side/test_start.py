@@ -33,7 +33,7 @@ def free_port() -> int:
         return port
 
 
-@pytest.mark.parametrize("flag", ["--arm", "--objects"])
+@pytest.mark.parametrize("flag", ["--arm", "--objects", "--pictures"])
 def test_a_driver_with_the_port_of_the_operators_is_named(flag: str) -> None:
     address = f"tcp://127.0.0.1:{free_port()}"
     code, _, complaint = ended("-m", "robot_side", f"--bind={address}", f"{flag}={address}")
