@@ -1,4 +1,4 @@
-"""Socket of the robot side to which a user's program connects: an arm's driver, or a perception of objects."""
+"""Socket of the robot side to which a user's program connects: an arm's driver, a perception of objects, or cameras."""
 
 from collections import Counter
 from typing import Final, NamedTuple

@@ -80,7 +80,7 @@ def _parser() -> argparse.ArgumentParser:
         choices=KEY_ROLES,
         default="operator",
         help="what it may do: operator drives and watches, observer watches, driver is the arm's driver at --arm,"
-        " perception sends objects to --objects (operator)",
+        " perception sends objects to --objects and pictures to --pictures (operator)",
     )
     actions.add_parser("list", parents=[common], help="list the keys in the folder, and the admitted peers")
     revoke = actions.add_parser("revoke", parents=[common], help="revoke an operator's key")
