@@ -13,9 +13,9 @@ from robot_side.drivers.remote.driver_session import ArmShape
 from robot_side.drivers.remote.frame_message import FRAME_LIMIT_BYTES
 from robot_side.drivers.remote.messages import STATE_LIMIT_BYTES
 from robot_side.drivers.remote.objects import RemoteObjects
-from robot_side.surroundings.perceived import PerceivedObjects
 from robot_side.drivers.remote.picture_message import PICTURE_LIMIT_BYTES
 from robot_side.drivers.remote.pictures import RemotePictures
+from robot_side.surroundings.perceived import PerceivedObjects
 
 _TURN_S: Final = 0.004
 _STATES_BYTES_PER_S: Final = 4e6
