@@ -7,6 +7,7 @@ from typing import Final
 
 from common.clock import clock_domain, wall_clock_offset_s
 from common.command.command_line import parse_settings, run_command
+from common.command.flag_value import with_value
 from common.command.status import Status
 from common.emulation.spec import unused_clauses
 from common.files.audit_log import AuditLog
@@ -15,6 +16,7 @@ from common.loop.process import Process
 from common.recording.provenance import provenance
 from common.sockets.door.client import Door
 from common.sockets.door.messages import DoorSettings
+from robot_side.commissioning.measuring import measure
 from robot_side.compiled.kernel import late_kernels
 from robot_side.compiled.warm_up import kernel_digests, kernels_compiled, warm_up
 from robot_side.core.robot_parts import RobotParts
@@ -60,7 +62,10 @@ def command(arguments: Sequence[str], adapt: Callable[[RobotParts], Adapted] = a
 
     adapt: takes the parts that were built; returns an experiment's parts and listeners.
     """
+    arguments = with_value("--measure-limits", "ask", arguments)
     settings = parse_settings(RobotSettings, "feelahead-robot", arguments)
+    if settings.measure_limits is not None:
+        return measure(settings)
     ports = DoorSettings(
         settings.bind,
         settings.view_bind,

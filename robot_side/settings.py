@@ -115,6 +115,11 @@ class RobotSettings(PaperFlags, SideOptions):
     fastest_m_s."""
     simulated_limits: Annotated[ArmLimits | None, tyro.conf.Suppress] = None
     """Only in a TOML file: limits of the simulated arm that [arm.limits] does not know, for experiments."""
+    measure_limits: Annotated[Literal["ask", "yes"] | None, tyro.conf.arg(metavar="[yes]")] = None
+    """Measure what the arm really does, print the lines of [arm.limits], and end, without an operator. Each joint moves
+    a little, back and forth (docs/real-arm.md). A person is asked before, unless yes is given."""
+    measure_room_rad: Annotated[float, tyro.conf.arg(metavar="RAD"), Meta(ge=0.1, le=3.0)] = 0.35
+    """Largest motion of a joint while its limits are measured; a seventh of it in m where it slides."""
     objects: Annotated[str | None, tyro.conf.arg(metavar="tcp://HOST:PORT")] = None
     """Address at which your perception process connects, instead of a simulated camera (docs/drivers.md)."""
     pictures: Annotated[str | None, tyro.conf.arg(metavar="tcp://HOST:PORT")] = None
