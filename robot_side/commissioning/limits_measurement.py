@@ -1,7 +1,7 @@
 """Measurement of all joints, one after the other, and its report: a table, and the lines of [arm.limits]."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -71,17 +71,17 @@ def measure_limits(
     oldest_s: float,
     say: Callable[[str], object],
     joints: Sequence[int] | None = None,
-) -> list[Measured]:
-    """Drive each joint a little; return what was measured of each, in order. joints: which ones; all if None.
+) -> Iterator[Measured]:
+    """Drive each joint a little; yield what was measured of each, in order. joints: which ones; all if None.
 
     A joint that does not follow ends with a line, and the next one begins. StoppedError if a person ends it;
     ProcedureError if the arm's states do not let it go on. say: called with one line for each joint.
     """
     slides = np.broadcast_to(known.limits.slides, len(names))
-    watch, found = Watch(known.limits, names, oldest_s), []
+    watch = Watch(known.limits, names, oldest_s)
     for joint, name in enumerate(names):
         if joints is not None and joint not in joints:
-            found.append(Measured(name, bool(slides[joint]), None, "left out"))
+            yield Measured(name, bool(slides[joint]), None, "left out")
             continue
         procedure = RunsOfJoint(joint, names, known.limits, room_rad)
         response, fault = None, None
@@ -93,9 +93,8 @@ def measure_limits(
             if not procedure.its_own_fault:
                 raise
             fault = str(error)
-        found.append(Measured(name, bool(slides[joint]), response, fault))
         say(fault or f"joint {joint + 1} ({name}): measured")
-    return found
+        yield Measured(name, bool(slides[joint]), response, fault)
 
 
 def table(found: Sequence[Measured], known: KnownLimits) -> list[list[str]]:

@@ -8,7 +8,14 @@ from rich.console import Console
 from rich.table import Table
 
 from robot_side.commissioning.arm_alone import arm_alone
-from robot_side.commissioning.limits_measurement import measure_limits, question, table, toml_lines
+from robot_side.commissioning.limits_measurement import (
+    KnownLimits,
+    Measured,
+    measure_limits,
+    question,
+    table,
+    toml_lines,
+)
 from robot_side.settings import RobotSettings
 
 _WIDTH_WITHOUT_TERMINAL: Final = 120
@@ -27,18 +34,27 @@ def measure(settings: RobotSettings) -> int:
             if settings.measure_limits != "yes" and one.answer("type yes to begin:") != "yes":
                 _say("nothing was moved")
                 return 1
-        found = measure_limits(one.arm, one.joint_names, one.known, one.pace, room_rad, settings.safety.arm_s, _say)
+        found: list[Measured] = []
+        names, known, oldest_s = one.joint_names, one.known, settings.safety.arm_s
+        try:
+            found.extend(measure_limits(one.arm, names, known, one.pace, room_rad, oldest_s, _say))
+        finally:
+            if found:
+                _show(found, known)
+    return 1 if any(joint.response is None for joint in found) else 0
+
+
+def _show(found: list[Measured], known: KnownLimits) -> None:
     shown = Table(title="what the arm does")
-    head, *rows = table(found, one.known)
+    head, *rows = table(found, known)
     for text in head:
         shown.add_column(text)
     for row in rows:
         shown.add_row(*row)
     Console(width=None if sys.stdout.isatty() else _WIDTH_WITHOUT_TERMINAL).print(shown)
-    if lines := toml_lines(found, one.known):
+    if len(found) == known.limits.velocity_rad_s.size and (lines := toml_lines(found, known)):
         _say("for the file of --config:\n")
         _say("\n".join(lines))
-    return 1 if any(joint.response is None for joint in found) else 0
 
 
 def _say(text: str) -> None:

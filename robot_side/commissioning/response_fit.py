@@ -1,4 +1,4 @@
-"""Response of a joint's drive, fitted to the measured positions of all of its runs.
+"""Response of a joint's drive, fitted to all measured positions.
 
 Model: a command takes effect after the latency. The velocity then rises with one acceleration and falls with another,
 and both begin and end with the same jerk.
@@ -22,11 +22,11 @@ _LARGEST_S: Final = 1.0
 _LARGEST_ACCELERATION: Final = 500.0
 _JERKS: Final = (1.0, 1e5)
 _TOLD: Final = 0.25
-"""Largest standard deviation of a figure, as a share of it, with which it is told"""
+"""Largest standard deviation of a figure, as a share of it, with which it is shown"""
 _RAMP_PERIODS: Final = 2.0
-"""Least duration of a ramp, in times between two states, from which its acceleration is told"""
+"""Least duration of a ramp, in times between two states, from which its acceleration is shown"""
 _ROUNDED_S: Final = 0.03
-"""Shortest time to the full acceleration from which the jerk is told; servos round off by 10 to 20 ms, too"""
+"""Shortest time to the full acceleration from which the jerk is shown; servos round off by 10 to 20 ms, too"""
 _CRUISES_S: Final = 0.04
 _HELD: Final = 0.98
 """Share of the commanded speed below which the arm held back"""
@@ -43,7 +43,7 @@ class Figure:
 
 @dataclass(frozen=True)
 class JointResponse:
-    """What one joint really does; metres instead of radians where it slides. None: it cannot be told."""
+    """Motion of one joint as it really is; metres instead of radians where it slides. None: it cannot be told."""
 
     velocity_rad_s: Figure
     """Greatest speed reached"""
@@ -53,7 +53,7 @@ class JointResponse:
     """While slowing down to a commanded stand"""
     jerk_rad_s3: float | None
     latency_s: float
-    """From command to motion; where no jerk is told, half of the rounding is in it"""
+    """From command to motion; half of the rounding is in it where no jerk is shown"""
     noise_rad: float
     """Standard deviation of the readings at rest"""
     off_rad: float

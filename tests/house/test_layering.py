@@ -132,9 +132,9 @@ ARROWS = """
     feelahead/printing: common
     feelahead/lab: common/* robot_side/* operator_side/* feelahead/both_sides feelahead/containers feelahead/printing
     feelahead/commands/bench_and_try.py: common common/files feelahead/lab
-    feelahead/commands: common/* robot_side/compiled robot_side/drivers/mujoco robot_side/laws/named.py
-        robot_side/laws/paper_settings.py
-        robot_side/viewing operator_side/* feelahead/both_sides feelahead/printing feelahead/recordings
+    feelahead/commands: common/* robot_side/commissioning robot_side/compiled robot_side/drivers/mujoco
+        robot_side/laws/named.py robot_side/laws/paper_settings.py robot_side/settings.py robot_side/viewing
+        operator_side/* feelahead/both_sides feelahead/printing feelahead/recordings
     feelahead: common/*
     feelahead/__init__.py: common/* robot_side/* operator_side/* feelahead/both_sides
 """

@@ -16,15 +16,15 @@ from rich.table import Table
 from rich.text import Text
 
 from common.command.command_line import parse_settings
+from common.errors import ConfigurationError
 from common.files.plugged import Installed, installed
 from common.sockets.authentication import OperatorKeys
 from feelahead.commands.doctor import controllers, link, machine
-from feelahead.commands.doctor.finding import Finding, Verdict, can_be
+from feelahead.commands.doctor.finding import COLOURS, Finding, Verdict, can_be
 from feelahead.commands.doctor.path import measure_path, path_line
 from feelahead.commands.doctor.port import RobotAddress
 from robot_side.laws.named import LAWS
 
-_COLOURS: Final = {Verdict.OK: "green", Verdict.NOTE: "yellow", Verdict.MISSING: "red"}
 _WIDTH_WITHOUT_TERMINAL: Final = 120
 
 
@@ -41,6 +41,10 @@ class DoctorSettings:
     doctor holds the arm, disarmed, if it is free, and otherwise observes. An operator who drives notices nothing. The
     machines' wall clocks need not agree.
 
+    With --arm: go through the checklist before the first motion of your arm, whose driver connects there. Each joint
+    moves by 2 degrees and back. All flags of feelahead-robot that describe the arm are valid; the address may be in the
+    --config file. See: feelahead doctor --arm --help, and docs/real-arm.md.
+
     With --compile: compile the kernels of all scenes for this machine's processor now, instead of at the first start.
     This takes half a minute or more. The machine code is kept in $NUMBA_CACHE_DIR, else in
     ~/.cache/feelahead/kernels; kernels that are already there stay. Exit code 1 if the folder cannot be written.
@@ -50,6 +54,8 @@ class DoctorSettings:
     """Print the result as one JSON object, for programs."""
     compile: bool = False
     """Compile the robot side's kernels now."""
+    arm: Annotated[str | None, tyro.conf.arg(metavar="[tcp://HOST:PORT]")] = None
+    """Go through the checklist of an arm whose driver connects at this address."""
     connect: Annotated[str | None, tyro.conf.arg(metavar="tcp://HOST:PORT")] = None
     """Check the path to a robot side at this address."""
     path: bool = True
@@ -73,6 +79,12 @@ class DoctorSettings:
 
 def doctor(arguments: Sequence[str]) -> int:
     """Run the checks that the arguments ask for, and print the result; return the exit code."""
+    if any(argument.partition("=")[0] == "--arm" for argument in arguments):
+        if missing := machine.failed_imports("robot"):
+            raise ConfigurationError(f"--arm needs the extra robot, which lacks {', '.join(missing)}")
+        from feelahead.commands.doctor.arm import check_arm  # noqa: PLC0415  # an operator machine has no MuJoCo
+
+        return check_arm(arguments)
     settings = parse_settings(DoctorSettings, "feelahead doctor", arguments)
     if settings.connect is not None:
         return _look_along(settings, settings.connect)
@@ -137,11 +149,11 @@ def show(findings: list[Finding], console: Console) -> None:
     table.add_column("")
     table.add_column("state", overflow="fold")
     for finding in findings:
-        table.add_row(finding.name, Text(finding.verdict.value, _COLOURS[finding.verdict]), Text(finding.said))
+        table.add_row(finding.name, Text(finding.verdict.value, COLOURS[finding.verdict]), Text(finding.said))
     console.print(table)
     remedies = [finding for finding in findings if finding.remedy is not None]
     for finding in remedies:
-        console.print(Text(f"{finding.name}:", _COLOURS[finding.verdict]))
+        console.print(Text(f"{finding.name}:", COLOURS[finding.verdict]))
         console.print(finding.remedy, markup=False, highlight=False, soft_wrap=True)
     if can_be("robot", findings):
         console.print("The demo can run: feelahead demo")

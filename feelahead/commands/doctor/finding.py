@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import Final
 
 
 class Verdict(StrEnum):
@@ -12,6 +13,9 @@ class Verdict(StrEnum):
     """The checked thing is optional: with it, something works better or becomes possible"""
     MISSING = "missing"
     """The checked thing does not work"""
+
+
+COLOURS: Final = {Verdict.OK: "green", Verdict.NOTE: "yellow", Verdict.MISSING: "red"}
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from common.errors import NoDriverError
+from common.errors import ConfigurationError, NoDriverError
 from feelahead.commands.doctor import command as doctor_command
 from feelahead.commands.doctor import controllers, machine
 from feelahead.commands.doctor.controllers import (
@@ -205,3 +205,17 @@ def test_kernels_are_compiled_beforehand_and_once_and_said_where_they_cannot_be_
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "file" / "kernels"))
     assert command(["doctor", "--compile"]) == 1
     assert "3 of 3 kernels were compiled, but not kept" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("flags", "said"),
+    [
+        (["--arm"], "--arm: has no address; valid: tcp://HOST:PORT"),
+        (["--arm", "tcp://127.0.0.1:0", "--block-mm", "0"], "block-mm = 0"),
+        (["--arm", "nowhere"], "nowhere"),
+        (["--arm", "tcp://127.0.0.1:0", "--model", "arm.xml"], "--model is given without --site"),
+    ],
+)
+def test_a_checklist_that_cannot_begin_says_why(flags: list[str], said: str) -> None:
+    with pytest.raises(ConfigurationError, match=re.escape(said)):
+        command(["doctor", *flags])

@@ -54,7 +54,7 @@ def known(limits: JointLimits, settings: ArmLimits | None = None, driver: ArmLim
 
 def measured(arm: Arm, room_rad: float = 0.35, **limits: float) -> list[Measured]:
     of_joints = ArmLimits(**limits).of_joints(2)
-    return measure_limits(arm, NAMES, known(of_joints), VirtualPace(), room_rad, OLDEST_S, lambda _: None)
+    return list(measure_limits(arm, NAMES, known(of_joints), VirtualPace(), room_rad, OLDEST_S, lambda _: None))
 
 
 @pytest.mark.long
@@ -77,7 +77,8 @@ def test_what_is_measured_is_what_was_set(
     before_rad = parts.arm.state(0.0).joint_positions_rad
     of = known(parts.limits, settings.arm_limits)
     # The other joints would move the gripper into the table.
-    found = measure_limits(parts.arm, names, of, VirtualPace(), room_rad, OLDEST_S, lambda _: None, joints=(0, 5))
+    driven = measure_limits(parts.arm, names, of, VirtualPace(), room_rad, OLDEST_S, lambda _: None, joints=(0, 5))
+    found = list(driven)
     assert [one.fault for one in found[1:5]] == ["left out"] * 4
     for one in (found[0], found[5]):
         response = one.response
@@ -194,6 +195,6 @@ def test_a_person_stops_the_arm() -> None:
             return bool(arm.joints_rad.max() > 0.05)
 
     with pytest.raises(ProcedureError, match="ended by a person"):
-        measure_limits(arm, NAMES, known(ArmLimits().of_joints(2)), Stopped(), 0.35, OLDEST_S, lambda _: None)
+        list(measure_limits(arm, NAMES, known(ArmLimits().of_joints(2)), Stopped(), 0.35, OLDEST_S, lambda _: None))
     assert not arm.told.any()
     assert arm.joints_rad.max() < 0.06
