@@ -28,7 +28,7 @@ _RAMP_PERIODS: Final = 2.0
 _ROUNDED_S: Final = 0.03
 """Shortest time to the full acceleration from which the jerk is shown; servos round off by 10 to 20 ms, too"""
 _CRUISES_S: Final = 0.04
-_HELD: Final = 0.98
+_HELD: Final = 0.97
 """Share of the commanded speed below which the arm held back"""
 
 
@@ -92,11 +92,13 @@ def fitted(measured: JointRuns) -> JointResponse:
     deviations = off * _deviations(best.jac)
     latency, (up, down, jerk) = float(best.x[0]), np.exp(best.x[1:4]).tolist()
     fits = list(zip(held_s, speeds.tolist(), (best.x[4:] * speeds).tolist(), strict=True))
+    surely = (3.0 * deviations[4:] * speeds).tolist()
     fastest = max(min(reached, speed, up * held) for held, speed, reached in fits)
     rounding = min(up, down) / jerk
     ramps_s = [reached / up + rounding + _CRUISES_S for _, _, reached in fits]
     held_back = any(
-        reached < _HELD * speed and held > ramp_s for (held, speed, reached), ramp_s in zip(fits, ramps_s, strict=True)
+        reached + most < _HELD * speed and held > ramp_s
+        for (held, speed, reached), ramp_s, most in zip(fits, ramps_s, surely, strict=True)
     )
     # An acceleration that the jerk does not let the arm come to cannot be told.
     shortest_s = max(_RAMP_PERIODS * measured.period_s, 1e-3)
