@@ -2,7 +2,6 @@
 
 import secrets
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from typing import Final
 
 from common.clock import clock_domain, wall_clock_offset_s
@@ -23,7 +22,7 @@ from robot_side.core.robot_parts import RobotParts
 from robot_side.core.robot_side import RobotSide
 from robot_side.drivers.mujoco.viewpoints import first_person_eye, overview_eye
 from robot_side.drivers.remote.connected_drivers import ConnectedDrivers, driver_ports
-from robot_side.parts import SceneParts, build_parts
+from robot_side.parts import build_parts, take_limits
 from robot_side.recording.recorder import RobotEncoder, RobotRecorder
 from robot_side.settings import RobotSettings
 from robot_side.tick.events import Listener
@@ -123,20 +122,6 @@ def command(arguments: Sequence[str], adapt: Callable[[RobotParts], Adapted] = a
             return turns
 
         return process.run(open_side)
-
-
-def take_limits(settings: RobotSettings, parts: SceneParts, drivers: ConnectedDrivers) -> tuple[RobotSettings, str]:
-    """Take the limits that the arm's driver says, where the settings give none.
-
-    Return the settings with them, as a recording keeps them, and a note for a person; no note without --arm.
-    """
-    if not drivers.has_arm:
-        return settings, ""
-    said, given = drivers.said_limits(), settings.arm_limits
-    limits = given.unless_known(said)
-    parts.limits.take(limits.of_joints(parts.arm.joint_count))
-    drivers.limits_taken()
-    return replace(settings, arm_limits=limits), f"the arm's limits: {given.sources(said)}"
 
 
 if __name__ == "__main__":

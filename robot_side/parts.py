@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -81,10 +81,11 @@ class SceneParts(RobotParts):
         A scene's primitives stay the same during a run. The primitives of ignored objects count, too.
         """
         seen = as_loaded(self.scene, dict.fromkeys(self.scene.roles, Role.OBSTACLE))
+        frames = seen, self.fixed
         unneeded = {
             kind.kernel
             for kind in KINDS
-            if not (self.any_objects or len(getattr(seen, kind.owner)) or len(getattr(self.fixed, kind.owner)))
+            if not (self.any_objects or any(len(getattr(one, kind.owner)) for one in frames))
         }
         return [kernel for kernel in imported_kernels() if kernel not in unneeded]
 
@@ -127,8 +128,7 @@ def build_parts(
     surroundings = Surroundings()
     unseen_m_s = settings.camera.unseen_m_s
     seen_elsewhere = None if drivers is None else drivers.objects(settings.roles, unseen_m_s, surroundings.see)
-    sides = settings.arm_workspace
-    fixed = fixed_objects(None if sides is None else (sides.lower_m, sides.upper_m), settings.arm_keep_out)
+    fixed = fixed_objects(settings.workspace_m, settings.arm_keep_out)
     # Before the first tick, as a search for spheres takes far longer than one.
     first = as_loaded(scene, scene.roles) if settings.objects is None else perceived([], [], 0.0)
     held_covers = HeldCovers(first, settings.cover_m, scene.never_held, searching)
@@ -180,6 +180,20 @@ def build_parts(
         seed=settings.seed,
         notes=(*notes, *late),
     )
+
+
+def take_limits(settings: RobotSettings, parts: SceneParts, drivers: ConnectedDrivers) -> tuple[RobotSettings, str]:
+    """Take the limits that the arm's driver says, where the settings give none.
+
+    Return the settings with them, as a recording keeps them, and a note for a person; no note without --arm.
+    """
+    if not drivers.has_arm:
+        return settings, ""
+    said, given = drivers.said_limits(), settings.arm_limits
+    limits = given.unless_known(said)
+    parts.limits.take(limits.of_joints(parts.arm.joint_count))
+    drivers.limits_taken()
+    return replace(settings, arm_limits=limits), f"the arm's limits: {given.sources(said)}"
 
 
 def _episodes(settings: RobotSettings, arm: MujocoArm | RemoteArm, camera: MujocoCamera) -> Episodes:

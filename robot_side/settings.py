@@ -184,6 +184,12 @@ class RobotSettings(PaperFlags, SideOptions):
         self.uncertainty(PredictionErrors())
 
     @property
+    def workspace_m(self) -> tuple[Vector3, Vector3] | None:
+        """Lower and upper corner of the workspace; None without one"""
+        sides = self.arm_workspace
+        return None if sides is None else (sides.lower_m, sides.upper_m)
+
+    @property
     def bounds(self) -> Bounds | None:
         """Bounds of the tool's motion; None without any"""
         found = Bounds(self.arm_workspace, self.arm_fastest_m_s)

@@ -155,7 +155,10 @@ def test_the_scripted_person_does_the_task_and_says_that_it_is_done() -> None:
         ({"model": "none.xml", "site": "tool"}, "none.xml: there is no such file"),
         ({"model": DATA / "wall.xml"}, "Episode: model is given without site; valid: both, or neither"),
         ({"gravity": 1.0, "bind": ""}, "Episode: bind, gravity: no such setting; valid: arm, arm_fastest_m_s, "),
-        ({"probabilty": 0.9}, "Episode: probabilty: no such setting (perhaps probability); valid: arm, arm_fastest_m_s, "),
+        (
+            {"probabilty": 0.9},
+            "Episode: probabilty: no such setting (perhaps probability); valid: arm, arm_fastest_m_s, ",
+        ),
         ({"link": "delay x"}, "delay: 'x' is no duration"),
         ({"link": 0.1}, "Episode: link is a float; valid: netem's words, a LinkProfile, or LinkProfiles by name"),
         ({"probability": 1.0}, "probability"),
