@@ -81,12 +81,8 @@ class SceneParts(RobotParts):
         A scene's primitives stay the same during a run. The primitives of ignored objects count, too.
         """
         seen = as_loaded(self.scene, dict.fromkeys(self.scene.roles, Role.OBSTACLE))
-        frames = seen, self.fixed
-        unneeded = {
-            kind.kernel
-            for kind in KINDS
-            if not (self.any_objects or any(len(getattr(one, kind.owner)) for one in frames))
-        }
+        held = {kind for kind in KINDS if len(getattr(seen, kind.owner)) + len(getattr(self.fixed, kind.owner))}
+        unneeded = {kind.kernel for kind in KINDS if not (self.any_objects or kind in held)}
         return [kernel for kernel in imported_kernels() if kernel not in unneeded]
 
 
