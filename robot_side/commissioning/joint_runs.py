@@ -29,6 +29,10 @@ _REACHED: Final = 0.9
 """Share of the commanded speed from which on the next speed is tried"""
 _SLOPE_S: Final = 0.04
 _FOLLOWS: Final = 0.3
+_STALLED_S: Final = 0.25
+_NOT_BEGUN_S: Final = 0.6
+_CRAWLS: Final = 0.2
+"""Times without progress, in s, after which a joint is not driven on; share of the commanded speed that is progress"""
 _OTHERS_RAD: Final = 0.03
 _WRONG_WAY_RAD: Final = 0.01
 _LEAST_RAD: Final = 0.1
@@ -154,10 +158,17 @@ class RunsOfJoint:
         seen = yield from self._rest(seen)
         run.began_s = seen.now_s
         direction, start = float(np.sign(velocity)), self._at(seen)
-        while direction * (self._at(seen) - start) + stopping < free and seen.now_s - run.began_s < _HELD_S:
-            if direction * (self._at(seen) - start) < -(_WRONG_WAY_RAD * self._scale + 6.0 * self._noise):
+        moved, farthest, progress_s = 0.0, 0.0, seen.now_s
+        while moved + stopping < free and seen.now_s - run.began_s < _HELD_S:
+            begun = moved > _WRONG_WAY_RAD * self._scale
+            if moved < -(_WRONG_WAY_RAD * self._scale + 6.0 * self._noise):
                 raise self._fault(f"{self._name} moves the other way than it is commanded")
+            if moved > farthest + _CRAWLS * abs(velocity) * _STALLED_S + self._noise:
+                farthest, progress_s = moved, seen.now_s
+            if seen.now_s - progress_s > (_STALLED_S if begun else _NOT_BEGUN_S):
+                raise self._fault(f"{self._name} does not follow, or met something, after {moved:.3f} {self._unit}")
             seen = yield from self._drive(velocity)
+            moved = direction * (self._at(seen) - start)
         run.ended_s = seen.now_s
         seen = yield from self._rest(seen, run.ended_s)
         moved, asked = direction * (self._at(seen) - start), abs(velocity) * (run.ended_s - run.began_s)

@@ -27,6 +27,7 @@ class FollowingArm(Arm):
         self.velocity_rad_s, self.acceleration_rad_s2 = np.zeros(2), np.inf
         self.follows = np.eye(2)
         self.condition: str | None = None
+        self.wall_rad, self.pressed_s = np.inf, 0.0
         self.old_s, self.fails_beyond_rad = 0.0, np.inf
 
     def command(self, joint_velocity_rad_s: np.ndarray, valid_until_s: float) -> None:
@@ -41,7 +42,10 @@ class FollowingArm(Arm):
         passed_s, self.now_s = now_s - self.now_s, now_s
         most = self.acceleration_rad_s2 * passed_s
         self.velocity_rad_s = self.velocity_rad_s + np.clip(self.told - self.velocity_rad_s, -most, most)
-        self.joints_rad = self.joints_rad + passed_s * self.velocity_rad_s
+        there_rad = self.joints_rad + passed_s * self.velocity_rad_s
+        self.joints_rad = np.minimum(there_rad, self.wall_rad)
+        if (there_rad > self.joints_rad).any():
+            self.pressed_s += passed_s
         failing = self.joints_rad.max() > self.fails_beyond_rad
         measured_s = now_s - (self.old_s if failing else 0.0)
         condition = self.condition if failing else None
@@ -141,7 +145,7 @@ def test_limits_that_somebody_knows_stay_where_they_were_not_reached() -> None:
     [
         (
             np.diag([0.0, 1.0]),
-            "joint 1 (shoulder) does not follow, or met something: it moved by 0.000 rad when 0.080 rad were commanded",
+            "joint 1 (shoulder) does not follow, or met something, after 0.000 rad",
         ),
         (np.diag([-1.0, 1.0]), "joint 1 (shoulder) moves the other way than it is commanded"),
         (np.array([[0.5, 0.0], [1.0, 1.0]]), "joint 2 (elbow) moves while joint 1 (shoulder) is commanded"),
@@ -154,6 +158,17 @@ def test_a_joint_that_does_not_follow_ends_with_a_line_and_the_next_begins(follo
     assert (first.response, first.fault) == (None, fault)
     assert second.response is not None
     assert not arm.told.any()
+
+
+def test_a_joint_that_meets_something_does_not_press_on() -> None:
+    arm = FollowingArm()
+    arm.wall_rad = 0.12
+    first, second = measured(arm)
+    assert first.response is None
+    assert first.fault is not None
+    assert first.fault.startswith("joint 1 (shoulder) does not follow, or met something, after 0.1")
+    assert second.response is None
+    assert arm.pressed_s < 2 * (0.25 + 0.1)  # without progress, and since the last progress that counts
 
 
 def test_a_joint_at_the_end_of_its_range_goes_the_other_way_or_is_left_out() -> None:
