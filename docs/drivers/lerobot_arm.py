@@ -1,4 +1,4 @@
-"""Driver of an SO-101 by LeRobot's own `Robot` (0.6.1; 0.4.4, too), in LeRobot's environment with pyzmq and msgpack.
+"""Driver of an SO-101 by LeRobot's own `Robot` (0.6.1), in LeRobot's environment with pyzmq and msgpack.
 
 Usage: python lerobot_arm.py /dev/ttyACM0 ID tcp://127.0.0.1:5601, with the ID of LeRobot's calibration.
 """

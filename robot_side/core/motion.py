@@ -71,7 +71,7 @@ class Motion:
             self._arm.command_gripper(0.0, now_s)
             return
         if self._assists and sensed is not None:
-            command = assisted(command, sensed.l2, sensed.r2)
+            command = assisted(command, sensed.l2, sensed.r2, self._limits.response_s)
         if homeward is None:
             where = pose, state.joint_positions_rad, self._limits, self._settings
             motion = commanded(command, *where, stands=grip.touchdown.stands, bounds=self._bounds)

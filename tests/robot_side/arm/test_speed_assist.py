@@ -23,10 +23,10 @@ def command(l2: float, r2: float) -> MotionCommand:
 
 
 @repeatable
-@given(distance_m=ways)
-def test_from_the_fastest_speed_the_arm_stops_in_time(distance_m: float) -> None:
-    speed = fastest_m_s(field(distance_m))
-    assert speed * FOLLOWS_S + speed * speed / (2.0 * ACCELERATION) == pytest.approx(max(distance_m, 0.0), abs=1e-12)
+@given(distance_m=ways, response_s=st.floats(0.0, 0.5))
+def test_from_the_fastest_speed_the_arm_stops_in_time(distance_m: float, response_s: float) -> None:
+    speed, follows_s = fastest_m_s(field(distance_m), response_s), FOLLOWS_S + response_s
+    assert speed * follows_s + speed * speed / (2.0 * ACCELERATION) == pytest.approx(max(distance_m, 0.0), abs=1e-12)
 
 
 @repeatable
