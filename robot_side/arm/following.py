@@ -64,13 +64,14 @@ class Following:
         self._noticed: Counter[str] = Counter()
         self._held = 0
         self._touches, self._asked_s = np.zeros(count, dtype=bool), np.full(count, -math.inf)
-        self.stops = LateStops(limits, self._names, sigma_rad)
+        self.stops = LateStops(limits, self._names, sigma_rad, np.where(turns, 2.0 * math.pi, math.inf))
         self.loads = LoadLimit(limits, self._names)
         self.restart()
 
     def restart(self) -> None:
         """Begin anew at the next state, which may be anywhere."""
         self._clock["time"] = -math.inf
+        self.stops.restart()
         self._forget()
 
     def _forget(self) -> None:

@@ -53,13 +53,23 @@ class LateStops:
     goes farther by τ times the fall.
     """
 
-    def __init__(self, limits: JointLimits, names: Sequence[str], sigma_rad: float = 0.0) -> None:
-        """names (n,): the joints'. sigma_rad: standard deviation of a reading."""
+    def __init__(
+        self,
+        limits: JointLimits,
+        names: Sequence[str],
+        sigma_rad: float = 0.0,
+        turns_rad: FloatArray | float = math.inf,
+    ) -> None:
+        """names (n,): the joints'. sigma_rad: standard deviation of a reading.
+
+        turns_rad: (n,) angles after which readings may repeat; infinite where they do not.
+        """
         count = limits.velocity_rad_s.size
         self.later_s = 0.0
         """Most time by which the arm was late, in s; it never falls during a run"""
         self._notes: list[str] = []
         self._limits, self._names, self._falls = limits, names, 0
+        self._turns_rad = np.broadcast_to(turns_rad, (count,))
         scale = np.where(limits.slides, LEVER_M, 1.0)
         self._from, self._least = _FROM_RAD_S * scale, _LEAST_RAD * scale + 6.0 * sigma_rad
         self._commands: deque[tuple[float, FloatArray]] = deque(maxlen=_COMMANDS)
@@ -95,7 +105,10 @@ class LateStops:
             zeros = np.zeros_like(before)
             fall = self._fall = _Fall(time_s - passed_s, before_rad, before, measured, zeros, zeros)
         fall.way = fall.way + 0.5 * passed_s * (before + now)
-        beyond = np.sign(fall.expected) * (self._position - fall.position - fall.way)
+        moved = self._position - fall.position
+        wraps = np.isfinite(self._turns_rad)
+        moved[wraps] -= self._turns_rad[wraps] * np.rint((moved - fall.way)[wraps] / self._turns_rad[wraps])
+        beyond = np.sign(fall.expected) * (moved - fall.way)
         fall.beyond = np.maximum(fall.beyond, beyond)
         settled = (measured <= np.abs(now) + _SETTLED * np.maximum(np.abs(fall.expected), self._from)).all()
         judged = self._judge(fall, before)
@@ -104,6 +117,10 @@ class LateStops:
         risen = float(np.abs(now).max()) > fall.lowest + _TREMBLES * float(np.abs(fall.expected).max())
         if risen or (rises >= 0.0 and settled) or time_s - fall.began_s > 2.0 * _MOST_S:
             self._falls, self._fall = self._falls + judged, None
+
+    def restart(self) -> None:
+        """Begin anew at the next state, which may be anywhere; what was found stays."""
+        self._time_s = -math.inf
 
     def take_notes(self) -> list[str]:
         """Return a line for each time since the last call that the arm was later than before."""

@@ -122,8 +122,9 @@ class StiffnessDeadband:
                 belief.expect(target_m_s, now_s + self.response_s)
                 return False
         before_m_s, later = commanded_m_s, deque[tuple[float, float]]()
-        if self.response_s > 0.0 and belief is not None:
-            before_m_s, later = belief.target_m_s, belief.later
+        if self.response_s > 0.0:
+            before_m_s = sensed.speed_m_s if belief is None else belief.target_m_s
+            later = later if belief is None else belief.later
         self._belief = _Belief(sensed, now_s, states, obeyed, commanded_m_s, before_m_s, sensed.speed_m_s, now_s)
         self._belief.later = later
         self._belief.expect(commanded_m_s, now_s + self.response_s)

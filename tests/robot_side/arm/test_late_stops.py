@@ -72,5 +72,20 @@ def test_a_pull_that_only_weakens_shows_it_too(delay_s: float) -> None:
     assert stops(8.0, delay_s, weakens_s=0.3).later_s == pytest.approx(delay_s, abs=0.012)
 
 
+def test_readings_that_wrap_and_an_arm_that_is_put_back_say_nothing() -> None:
+    judge = LateStops(SAID.of_joints(3), NAMES, 2e-4, np.array([2.0 * np.pi, np.inf, np.inf]))
+    position, velocity = np.array([np.pi - 0.3, 0.0, 0.0]), np.zeros(3)
+    for tick in range(600):
+        told = np.full(3, 0.8) if tick < 200 else np.zeros(3)
+        velocity = velocity + np.clip(told - velocity, -8.0 * TICK_S, 8.0 * TICK_S)
+        position = position + TICK_S * velocity
+        if tick == 205:
+            position = position + np.array([0.0, 1.0, 1.0])
+            judge.restart()
+        read = np.array([(position[0] + np.pi) % (2.0 * np.pi) - np.pi, *position[1:]])
+        judge.update(told, ArmState(tick * TICK_S, read, velocity, np.empty(0), 0.0, gripper_holding=False), 0.0)
+    assert judge.later_s == 0.0
+
+
 def test_slow_motion_says_nothing() -> None:
     assert stops(2.0, speed=0.05).summary() == {"judged": 0, "later_ms": 0.0}

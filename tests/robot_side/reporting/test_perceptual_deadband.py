@@ -1,6 +1,7 @@
 """Enough messages are sent: a receiver that extrapolates the last one is never wrong by more than can be felt."""
 
 import math
+from collections import deque
 from itertools import pairwise
 from typing import Any
 
@@ -39,8 +40,11 @@ def sensed(left_m: float, speed_m_s: float = 0.0, **changes: Any) -> Sensed:
 class Run:
     """Simulated gripper before a wall, and what a receiver computes from the last message, tick by tick."""
 
-    def __init__(self, left_m: float, **options: Any) -> None:
+    def __init__(self, left_m: float, response_ticks: int = 0, **options: Any) -> None:
+        """response_ticks: after which arm and receiver follow a command."""
         self.deadband = StiffnessDeadband(**options)
+        self.deadband.response_s = response_ticks * TICK_S
+        self.late = deque([0.0] * response_ticks)
         self.left_m, self.speed_m_s, self.commanded_m_s = left_m, 0.0, 0.0
         self.now_s, self.sent_s = 0.0, [-math.inf]
         self.believed_m, self.moved_m, self.believed_m_s = left_m, 0.0, 0.0
@@ -50,7 +54,8 @@ class Run:
         moved_m, self.speed_m_s = follow(0.0, self.speed_m_s, self.commanded_m_s, A_M_S2, TICK_S)
         self.moved_m, self.believed_m_s = follow(self.moved_m, self.believed_m_s, self.commanded_m_s, A_M_S2, TICK_S)
         self.left_m -= moved_m + wall_m_s * TICK_S
-        self.commanded_m_s = commanded_m_s
+        self.late.append(commanded_m_s)
+        self.commanded_m_s = self.late.popleft()
         state: MotionState = how.get("state", "armed")
         compensation: Compensation = how.get("compensation", "operator")
         travel = commanded_m_s / FULL_M_S
@@ -83,10 +88,10 @@ class Run:
 moves = st.lists(st.tuples(st.integers(1, 60), st.floats(-0.25, 0.25), st.floats(-0.4, 0.4)), min_size=1, max_size=8)
 
 
-@given(st.floats(0.02, 0.35), moves)
+@given(st.floats(0.02, 0.35), moves, st.sampled_from([0, 0, 15, 50]))
 @settings(derandomize=True, deadline=None, max_examples=100)
-def test_the_receiver_is_never_wrong_by_more_than_can_be_felt(left_m: float, moves: Any) -> None:
-    run = Run(left_m)
+def test_the_receiver_is_never_wrong_by_more_than_can_be_felt(left_m: float, moves: Any, response_ticks: int) -> None:
+    run = Run(left_m, response_ticks)
     for ticks, commanded_m_s, wall_m_s in moves:
         for _ in range(ticks):
             due = run.tick(commanded_m_s, wall_m_s)
