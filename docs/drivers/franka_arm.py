@@ -61,10 +61,10 @@ def main(robot_address: str, address: str = "tcp://127.0.0.1:5601") -> None:
                 robot.joint_jerk_limit.set(MOST["jerk_rad_s3"])
             measured_s, seen, newest, told = time.monotonic(), robot.state, shared["newest"], mode
             left_s, mode, hand = newest["valid_until_s"] - measured_s, seen.robot_mode.name, shared["hand"]
-            if left_s > 0.0 and (any(newest["joint_velocities"]) or robot.is_in_control):
+            if robot.is_in_control or (left_s > 0.0 and any(newest["joint_velocities"])):
                 way, hold = franky.JointVelocityWaypoint, franky.Duration(max(int(1e3 * left_s), 1))
-                ways = [way(newest["joint_velocities"], hold_target_duration=hold), way([0.0] * 7)]
-                robot.move(franky.JointVelocityWaypointMotion(ways), asynchronous=True)
+                ways = [way(newest["joint_velocities"], hold_target_duration=hold)] if left_s > 0.0 else []
+                robot.move(franky.JointVelocityWaypointMotion([*ways, way([0.0] * 7)]), asynchronous=True)
             elif mode == told == "Reflex":  # the robot side has been told, and nobody drives
                 robot.recover_from_errors()
             robot.poll_motion()  # raises what ended the last motion

@@ -30,14 +30,14 @@ class Driver:
         self._socket.sndhwm, self._socket.linger = 2, 0
         self._socket.connect(address)
         self._command, self._read_s, self._sequence, self._at_s = dict[str, Any](NOTHING), math.inf, 0, -math.inf
-        self._here, self._goals, self._speeds = list[float](), list[float](), [0.0] * len(SCALES)
+        self.here, self._goals, self._speeds = list[float](), list[float](), [0.0] * len(SCALES)
 
     def turn(self, seen: dict[str, Any], at_s: float, fault: str = "") -> dict[str, float]:
         """Take an observation that began at `at_s`, send the state, take the newest command; return the goals."""
         here, passed_s = [float(seen[f"{name}.pos"]) * scale for name, scale in SCALES.items()], at_s - self._at_s
-        share, moves = -math.expm1(-passed_s / FILTER_S), zip(self._speeds, self._here or here, here, strict=True)
+        share, moves = -math.expm1(-passed_s / FILTER_S), zip(self._speeds, self.here or here, here, strict=True)
         self._speeds = [old + share * ((new - was) / passed_s - old) for old, was, new in moves]
-        self._at_s, self._here, self._goals = at_s, here, self._goals or here
+        self._at_s, self.here, self._goals = at_s, here, self._goals or here
         self.send(fault)
         valid_s = max(min(self._command["valid_until_s"] - at_s + passed_s, passed_s), 0.0) if passed_s < GAP_S else 0.0
         told = *self._command["joint_velocities"], -CLOSING_PER_S * self._command["closing"]
@@ -53,7 +53,7 @@ class Driver:
                 print("refused:", message["refused"], flush=True)
             else:
                 self._command, self._read_s = message, time.monotonic()
-        (*joints, jaw), self._sequence, sent_s = self._here, self._sequence + 1, time.monotonic()
+        (*joints, jaw), self._sequence, sent_s = self.here, self._sequence + 1, time.monotonic()
         state = {"version": 1, "sequence": self._sequence, "sent_s": sent_s, "measured_s": self._at_s, "limits": LIMITS}
         state |= {"echo_s": self._command.get("sent_s"), "held_s": max(sent_s - self._read_s, 0.0)}
         state |= {"joint_positions": joints, "joint_velocities": self._speeds[:-1]}
@@ -78,7 +78,7 @@ def drive(robot: Any, address: str, rate_hz: float = 50.0) -> None:
             dead_s, why = time.monotonic() - good_s, f"servo bus: {str(error).strip().partition(chr(10))[0]}"
             if dead_s > GIVE_UP_S:
                 raise SystemExit(f"{why} (for {dead_s:.1f} s; check its power and its plugs)") from None
-            if dead_s > GAP_S:
+            if dead_s > GAP_S and driver.here:
                 driver.send(why)
         time.sleep(max(began_s + 1.0 / rate_hz - time.monotonic(), 0.0))
 

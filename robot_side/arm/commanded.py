@@ -69,6 +69,9 @@ def commanded(
         twist[:3] = bounds.kept(asked_m_s, pose.tool_position_m, limits)
         bounded = not np.allclose(twist[:3], asked_m_s)
     velocity = joint_velocities(pose.tool_jacobian, twist, limits.velocity_rad_s)
+    if bounds is not None:  # an arm of few joints moves otherwise than asked
+        share = bounds.share(pose.tool_jacobian[:3] @ velocity, pose.tool_position_m, limits)
+        velocity, bounded = share * velocity, bounded or share < 1.0 - _LEAST
     lower, upper = limits.ends_rad
     stays = ((velocity < 0.0) & (joint_positions_rad <= lower + _AT_END_RAD)) | (
         (velocity > 0.0) & (joint_positions_rad >= upper - _AT_END_RAD)

@@ -16,7 +16,9 @@ VELOCITY_RAD_S: Final = 2.0
 ACCELERATION_RAD_S2: Final = 8.0
 DECELERATION_RAD_S2: Final = 12.0
 
-_Limit = Annotated[float, Meta(gt=0.0, le=1e6)]
+_Limit = Annotated[float, Meta(ge=1e-3, le=1e6)]
+_LATEST_S: Final = 1.0
+"""Longest time in which an arm may respond"""
 EachJoint = _Limit | tuple[_Limit, ...]
 
 
@@ -53,7 +55,7 @@ class ArmLimits:
     ) -> "JointLimits":
         """Return these limits for `count` joints (n); the other arguments are as in `JointLimits`.
 
-        ValueError names a limit that has another number of values than there are joints.
+        ValueError names a limit that has another number of values than there are joints, and for a late response.
         """
 
         def each(name: str, value: EachJoint | None, unless_known: float) -> FloatArray:
@@ -62,7 +64,7 @@ class ArmLimits:
                 raise ValueError(f"arm.limits.{name} holds {len(value)} values; valid: one number, or {count}")
             return np.broadcast_to(np.asarray(values, dtype=np.float64), (count,)).copy()
 
-        return JointLimits(
+        limits = JointLimits(
             each("velocity_rad_s", self.velocity_rad_s, VELOCITY_RAD_S),
             each("acceleration_rad_s2", self.acceleration_rad_s2, ACCELERATION_RAD_S2),
             lower_rad,
@@ -73,6 +75,12 @@ class ArmLimits:
             self.latency_s or 0.0,
             each("load_nm", self.load_nm, math.inf),
         )
+        if limits.response_s > _LATEST_S:
+            raise ValueError(
+                f"arm.limits: latency, and half of acceleration by jerk, are {limits.response_s:.3g} s; valid: up to"
+                f" {_LATEST_S:g} s"
+            )
+        return limits
 
     def unless_known(self, others: "ArmLimits") -> "ArmLimits":
         """Return these limits, with the others' where these are not known."""

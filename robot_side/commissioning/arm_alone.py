@@ -57,14 +57,17 @@ class ArmAlone:
     joint_names: tuple[str, ...]
     pace: Pace
     simulated: bool
+    aside: bool = False
+    """Whether questions go to standard error"""
 
     def answer(self, question: str) -> str:
         """Ask a person, and return the answer in small letters; meanwhile the arm is commanded nothing.
 
         "" at the end of the input. StoppedError if a stop signal comes.
         """
-        sys.stdout.write(f"{question} ")
-        sys.stdout.flush()
+        stream = sys.stderr if self.aside else sys.stdout
+        stream.write(f"{question} ")
+        stream.flush()
         while not select([sys.stdin], [], [], _LOOK_S)[0]:
             if self.pace.stopped:
                 raise StoppedError("ended by a person: nothing was moved since the last line")

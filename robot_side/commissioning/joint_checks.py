@@ -14,6 +14,10 @@ from robot_side.commissioning.procedure import SLIDE_M_PER_RAD, Motion, Procedur
 
 NUDGE_RAD: Final = math.radians(2.0)
 _RATE_RAD_S: Final = 0.05
+_MIRRORED: Final = -0.3
+_MOST: Final = 1.5
+_LEAST_BACK: Final = 0.1
+"""Shares of its way: by which a joint that moves the other way is stopped, by which any joint is, and that matters"""
 _SETTLES_S: Final = 0.6
 _LISTENS_S: Final = 2.0
 _CLOSING: Final = 0.3
@@ -80,7 +84,8 @@ def listen(joints: int) -> Procedure[Heard]:
 def nudge(joint: int, limits: JointLimits, *, back_from: Nudged | None = None) -> Procedure[Nudged]:
     """Move one joint slowly by 2 degrees (5 mm where it slides), away from the nearer end of its range.
 
-    back_from: an earlier motion, which this one undoes.
+    back_from: an earlier motion, which this one undoes. A joint that moves the other way is stopped at a third of it,
+    and so are all when another one moves farther.
     """
     joints = limits.velocity_rad_s.size
     slides = bool(np.broadcast_to(limits.slides, joints)[joint])
@@ -93,9 +98,15 @@ def nudge(joint: int, limits: JointLimits, *, back_from: Nudged | None = None) -
     way = NUDGE_RAD * scale * (1.0 if upper - position >= position - lower else -1.0)
     if back_from is not None:
         way = float(back_from.before.joint_positions_rad[joint]) - position
+        if abs(way) < _LEAST_BACK * NUDGE_RAD * scale:  # it stands where it was, as far as readings tell
+            return Nudged(way, np.zeros(joints), before, before)
     command[joint] = math.copysign(min(_RATE_RAD_S * scale, float(limits.velocity_rad_s[joint])), way)
     until_s = seen.now_s + 2.0 * abs(way / command[joint]) + _SETTLES_S
-    while seen.now_s < until_s and (float(seen.state.joint_positions_rad[joint]) - position) / way < 1.0:
+    scales = np.where(np.broadcast_to(limits.slides, joints), SLIDE_M_PER_RAD, 1.0)
+    while seen.now_s < until_s:
+        moved = seen.state.joint_positions_rad - before.joint_positions_rad
+        if not _MIRRORED < moved[joint] / way < 1.0 or (np.abs(moved / scales) > _MOST * NUDGE_RAD).any():
+            break
         seen = yield Motion(command)
     until_s = seen.now_s + _SETTLES_S
     while seen.now_s < until_s:

@@ -58,7 +58,8 @@ def question(joints: int, room_rad: float, *, slides: bool) -> str:
     sliding = f", or {room_rad * SLIDE_M_PER_RAD:.3f} m where it slides" if slides else ""
     return (
         f"each of {joints} joints moves by up to {room_rad:g} rad{sliding}, back and forth, one after the other,"
-        " faster and faster; see that nothing is in the way, and keep a hand on the emergency stop"
+        " faster and faster, whatever the workspace; see that nothing is in the way, and keep a hand on the emergency"
+        " stop"
     )
 
 

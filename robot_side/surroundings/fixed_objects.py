@@ -10,6 +10,8 @@ from common.roles import Role
 from robot_side.surroundings.perceived import KINDS, ObjectSource, PerceivedObjects
 
 Vector3 = tuple[float, float, float]
+KEEP_OUT = "keep out "
+"""First words of the names of boxes"""
 
 
 class PlacedBox(Protocol):
@@ -45,7 +47,7 @@ def fixed_objects(workspace: tuple[Vector3, Vector3] | None, keep_out: Sequence[
         normals = np.concatenate([-np.eye(3), np.eye(3)])
         offsets_m = np.concatenate([-np.array(workspace[1]), np.array(workspace[0])])
     boxes, sides = len(keep_out), len(offsets_m)
-    names = (*(f"keep out {number}" for number in range(1, boxes + 1)), *SIDES[:sides])
+    names = (*(f"{KEEP_OUT}{number}" for number in range(1, boxes + 1)), *SIDES[:sides])
     turned = [Rotation.from_quat(one.quaternion, scalar_first=True).as_matrix() for one in keep_out]
     centers_m = np.array([one.center_m for one in keep_out]).reshape(-1, 3)
     return PerceivedObjects(
@@ -72,11 +74,11 @@ def fixed_objects(workspace: tuple[Vector3, Vector3] | None, keep_out: Sequence[
 
 
 def joined(frame: PerceivedObjects, fixed: PerceivedObjects) -> PerceivedObjects:
-    """Return the frame with the fixed objects behind its own; ValueError for a name that both have."""
-    if both := set(frame.names) & set(fixed.names):
-        raise ValueError(
-            f"objects are named {', '.join(sorted(both))}; valid: other names, as these are fixed objects'"
-        )
+    """Return the frame with the fixed objects behind its own.
+
+    A camera's object may have a fixed one's name; the fixed one is then told from it by an exclamation mark.
+    """
+    names = tuple(name if name not in frame.names else f"{name}!" for name in fixed.names)
     arrays: dict[str, Any] = {}
     for kind in KINDS:
         for name in kind.parts:
@@ -91,7 +93,7 @@ def joined(frame: PerceivedObjects, fixed: PerceivedObjects) -> PerceivedObjects
     sds_m = np.full(count, np.nan) if frame.sds_m is None else frame.sds_m
     return PerceivedObjects(
         time_s=frame.time_s,
-        names=frame.names + fixed.names,
+        names=frame.names + names,
         roles=frame.roles + fixed.roles,
         mesh_library=frame.mesh_library,
         sds_m=np.concatenate([sds_m, np.zeros(len(fixed.names))]),
@@ -100,6 +102,11 @@ def joined(frame: PerceivedObjects, fixed: PerceivedObjects) -> PerceivedObjects
         **arrays,
         **known,
     )
+
+
+def is_fixed(name: str) -> bool:
+    """Return whether a fixed object may have the name: a target never has it."""
+    return name.rstrip("!") in SIDES or name.startswith(KEEP_OUT)
 
 
 class WithFixed:
@@ -118,9 +125,8 @@ class WithFixed:
 
     def set_role(self, name: str, role: Role) -> None:
         """Change the role of an object of the source from the next frame on; a fixed object keeps its own."""
-        if name in self._fixed.names:
-            raise ValueError(f"name = {name!r} is a fixed object, always an obstacle; valid: another name")
-        self._source.set_role(name, role)
+        if not is_fixed(name):
+            self._source.set_role(name, role)
 
 
 def with_fixed(source: ObjectSource, fixed: PerceivedObjects) -> ObjectSource:

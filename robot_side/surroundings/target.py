@@ -4,6 +4,7 @@ import numpy as np
 
 from common.arrays import FloatArray, IntArray
 from common.roles import Role
+from robot_side.surroundings.fixed_objects import is_fixed
 from robot_side.surroundings.kinds.layout import HALF_SPACE, TETRAHEDRON
 from robot_side.surroundings.perceived import PerceivedObjects
 from robot_side.surroundings.scene_table import SceneTable
@@ -62,7 +63,8 @@ def next_target(
     eligible = [
         index
         for index, role in enumerate(objects.roles)
-        if (role is Role.OBSTACLE and along[index] > 0.0) or (role is Role.TARGET and np.isfinite(along[index]))
+        if (role is Role.OBSTACLE and along[index] > 0.0 and not is_fixed(objects.names[index]))
+        or (role is Role.TARGET and np.isfinite(along[index]))
     ]
     order = sorted(eligible, key=lambda index: along[index] + _OFF_AXIS_WEIGHT * across[index])
     if present is None or present not in order:

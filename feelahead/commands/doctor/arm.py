@@ -50,7 +50,8 @@ def check_arm(arguments: Sequence[str]) -> int:
     findings: list[Finding] = []
     unseen: list[str] = []
     console = Console(file=sys.stdout, highlight=False)
-    with arm_alone(settings, say) as one:
+    with arm_alone(settings, say) as alone:
+        one = dataclasses.replace(alone, aside=settings.json)
         say("each joint moves by 2° (5 mm where it slides) and back; keep a hand on the emergency stop")
         if not settings.yes and one.answer("type yes to begin:") != "yes":
             say("nothing was moved")

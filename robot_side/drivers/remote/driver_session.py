@@ -205,9 +205,8 @@ class DriverSession:
                 raise ValueError(
                     f"{name} holds {len(values)} values; valid: {len(names)} ({', '.join(names) or 'none'})"
                 )
-        for name, limits in () if said.limits is None else msgspec.structs.asdict(said.limits).items():
-            if isinstance(limits, tuple) and len(limits) != len(self._shape.joint_names):
-                raise ValueError(f"limits.{name} holds {len(limits)} values; valid: {len(self._shape.joint_names)}")
+        if said.limits is not None:
+            ArmLimits(**msgspec.structs.asdict(said.limits)).of_joints(len(self._shape.joint_names))
         if not said.condition_text.isprintable():
             raise RemoteProtocolError(f"condition_text = {said.condition_text!r:.100}; valid: printable characters")
         if said.measured_s > said.sent_s:
@@ -238,8 +237,13 @@ class DriverSession:
             why = "the driver's clock jumped, or echo_s and held_s are not from our commands"
             self._reject("clock", why, peer, received_s)
             return
-        if self.accepted == 0 and said.limits is not None:
-            self._said_limits = ArmLimits(**msgspec.structs.asdict(said.limits))
+        if said.limits is not None:
+            limits = ArmLimits(**msgspec.structs.asdict(said.limits))
+            if self.accepted == 0:
+                self._said_limits = limits
+            elif limits != self._said_limits:
+                why = "the driver says other limits than at the start: start feelahead-robot again"
+                self._doubt_states(why, received_s)
         positions, velocities = floats(said.joint_positions), floats(said.joint_velocities)
         if (fault := self._plausibility.fault(said.measured_s, positions, velocities)) is not None:
             self._doubt_states(f"the driver's states cannot be true: {fault}", received_s)

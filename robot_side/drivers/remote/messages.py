@@ -24,7 +24,7 @@ _Values = Annotated[tuple[_Value, ...], Meta(max_length=MOST_JOINTS)]
 Message = TypeVar("Message", bound=Struct)
 
 
-_Limits = Annotated[tuple[Annotated[float, Meta(gt=0.0, le=1e6)], ...], Meta(max_length=MOST_JOINTS)]
+_Limits = Annotated[tuple[Annotated[float, Meta(ge=1e-3, le=1e6)], ...], Meta(max_length=MOST_JOINTS)]
 Condition = Literal["ready", "protective_stop", "fault", "emergency_stop"]
 
 

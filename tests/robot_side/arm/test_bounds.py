@@ -10,9 +10,12 @@ from hypothesis import strategies as st
 
 from common.command.command_line import load_toml
 from common.errors import ConfigurationError
+from common.protocol.messages import Header, MotionCommand
 from common.roles import Role
 from robot_side.arm.bounds import Bounds, KeepOut, Workspace
+from robot_side.arm.commanded import commanded
 from robot_side.arm.limits import ArmLimits
+from robot_side.arm.tool_motion import ToolMotionSettings
 from robot_side.parts import build_parts
 from robot_side.settings import RobotSettings
 from robot_side.surroundings.fixed_objects import WithFixed, fixed_objects, joined
@@ -85,10 +88,38 @@ def test_fixed_objects_stand_behind_a_frames_own(boxes: int) -> None:
     assert (inside > fixed.half_space_offsets_m).all()
     source = WithFixed(parts.camera, fixed)
     assert source.perceive(0.0) is source.perceive(0.0)
-    with pytest.raises(ValueError, match="fixed object"):
-        source.set_role("workspace +x", Role.TARGET)
-    with pytest.raises(ValueError, match="workspace"):
-        joined(both, fixed)
+    source.set_role("workspace +x", Role.TARGET)
+    assert source.perceive(0.0).roles == both.roles
+    # A camera may use the same names.
+    assert len(set(joined(both, fixed).names)) == len(both.names) + len(fixed.names)
+
+
+def test_no_button_makes_a_fixed_object_the_target() -> None:
+    boxes = (KeepOut((0.55, 0.0, 0.4), (0.02, 0.02, 0.02)), KeepOut((0.6, 0.0, 0.3), (0.02, 0.02, 0.02)))
+    bench = Bench(replace(QUICK, arm_workspace=Workspace((-2.0, -2.0, -1.0), (2.0, 2.0, 2.0)), arm_keep_out=boxes))
+    operator = bench.join(2)
+    chosen = set[object]()
+    for _ in range(12):
+        bench.drive(0.02, operator, next_target=True)
+        bench.drive(0.02, operator)
+        chosen.add(bench.robot.status(bench.now_s).target)
+    assert len(chosen) > 2
+    assert not [name for name in chosen if str(name).startswith(("keep out", "workspace"))]
+
+
+def test_an_arm_that_cannot_move_as_asked_keeps_its_bounds_too() -> None:
+    """Two joints turn the tool about z, 0.4 m apart: who asks for a turn alone gets a way as well."""
+    random = np.random.default_rng(3)
+    bounds, home = Bounds(Workspace((0.0, -0.2, 0.0), (1.0, 0.2, 1.0)), 0.05), build_parts(QUICK, 1, "clock")
+    pose = home.kinematics.pose(home.arm.state(0.0))
+    for _ in range(200):
+        few = replace(pose, tool_jacobian=random.normal(size=(6, 4)), tool_position_m=np.array([0.5, 0.19, 0.5]))
+        command = MotionCommand(Header(1, 1, 0.0), 0.0, 0.0, turning=(1.0, 0.5), run=True)
+        limits = ArmLimits().of_joints(4)
+        motion = commanded(command, few, np.zeros(4), limits, ToolMotionSettings(), bounds=bounds)
+        linear_m_s = few.tool_jacobian[:3] @ motion.velocity_rad_s
+        assert np.linalg.norm(linear_m_s) <= 0.05 + 1e-9
+        assert 0.02 * linear_m_s[1] <= 0.01 + 1e-12
 
 
 TABLE = """

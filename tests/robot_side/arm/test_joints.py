@@ -241,7 +241,8 @@ def test_a_hindrance_is_told_once_and_in_words() -> None:
     for cause in Cause:
         hindrance.update(1.0, cause, 2)
         said.append(hindrance.text)
-    assert said[-3:] == ["near a singularity", "joint 2 at its fastest", "too few joints for this motion"]
+    assert said[-4:-1] == ["near a singularity", "joint 2 at its fastest", "too few joints for this motion"]
+    assert said[-1] == "at a bound of the workspace, or of speed"
     hindrance.end()
     assert (hindrance.text, hindrance.undone) == (None, 0.0)
 

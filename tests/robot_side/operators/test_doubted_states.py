@@ -19,9 +19,12 @@ class DoubtedArm(PassedOnArm):
     doubt: str | None = None
     condition: str | None = None
     load_nm: float | None = None
+    blind = False
 
     def state(self, now_s: float) -> ArmState:
         state = replace(self.arm.state(now_s), doubt=self.doubt, condition=self.condition)
+        if self.blind:
+            return replace(state, joint_loads_nm=None)
         return state if self.load_nm is None else replace(state, joint_loads_nm=np.full(self.joint_count, self.load_nm))
 
 
@@ -88,3 +91,14 @@ def test_a_load_over_its_limit_stops_the_arm_which_may_then_be_driven_away() -> 
     arm.load_nm = 30.0
     bench.drive(0.2, operator, l2=0.4)
     assert len(bench.robot.session.safety.stops) == stops + 1
+
+
+def test_a_load_limit_without_loads_lets_nobody_drive() -> None:
+    arm, bench, operator = cruising(replace(QUICK, arm_limits=ArmLimits(load_nm=200.0)))
+    arm.blind = True
+    bench.drive(0.1, operator, r2=0.4)
+    status = bench.robot.status(bench.now_s)
+    assert (status.state, status.stopped_because) == (
+        "disarmed",
+        "load_nm is set, and the driver sends no joint_loads",
+    )

@@ -302,6 +302,11 @@ def test_the_first_state_says_the_arms_limits_and_each_its_condition() -> None:
     desk.also = {"limits": {"velocity_rad_s": [9.0, 9.0]}}
     desk.run(0.1)
     assert desk.arm.session.said_limits == ArmLimits((1.0, 2.0), (3.0, 4.0), latency_s=0.05)
+    # Whoever says others later is not believed: the law would go on with the first ones.
+    assert "other limits than at the start" in (desk.arm.state(desk.now_s).doubt or "")
+    desk.also = {}
+    desk.run(0.7)
+    assert desk.arm.state(desk.now_s).doubt is None
     assert desk.arm.state(desk.now_s).condition is None
     desk.also = {"condition": "protective_stop", "condition_text": "joint 4 met something"}
     desk.run(0.1)
@@ -314,8 +319,14 @@ def test_the_first_state_says_the_arms_limits_and_each_its_condition() -> None:
 @pytest.mark.parametrize(
     ("fields", "why", "says"),
     [
-        ({"limits": {"velocity_rad_s": [1.0]}}, "joints", "limits.velocity_rad_s holds 1 values; valid: 2"),
+        (
+            {"limits": {"velocity_rad_s": [1.0]}},
+            "joints",
+            "limits.velocity_rad_s holds 1 values; valid: one number, or 2",
+        ),
         ({"limits": {"velocity_rad_s": [1.0, -1.0]}}, "malformed", "limits.velocity_rad_s"),
+        ({"limits": {"jerk_rad_s3": [5e-324, 1.0]}}, "malformed", "limits.jerk_rad_s3"),
+        ({"limits": {"jerk_rad_s3": [0.01, 1.0]}}, "joints", "valid: up to 1 s"),
         ({"limits": {"speed": [1.0, 1.0]}}, "malformed", "speed"),
         ({"condition": "tired"}, "malformed", "condition"),
         ({"condition_text": "a\nb"}, "malformed", "printable"),
