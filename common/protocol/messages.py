@@ -211,7 +211,8 @@ class TriggerField(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_
     """Advances from here along the trigger at which strengths 1 to 8 begin, in ascending order, for fast zones;
     `horizon_m` for those beyond the horizon. Below 0: the gripper is past the onset."""
     slow_m: OnsetDistances
-    """The same for slow zones, whose commanded speed is so low that touching the target is allowed."""
+    """Advances from here along the trigger at which strengths 1 to 8 begin, for slow zones, whose commanded speed is so
+    low that touching the target is allowed."""
     full_speed_m_s: float
     """v_max: speed along the trigger's direction that a full pull commands in this pose."""
     acceleration_m_s2: float

@@ -86,7 +86,7 @@ def frozen_values() -> dict[str, Any]:
             "windup_rad": WINDUP_RAD,
         },
         "tool": asdict(ToolMotionSettings()),
-        "camera": asdict(CameraSettings()),
+        "camera": {name: asdict(CameraSettings())[name] for name in ("mean_m", "sd_m", "frame_sd_m")},
         "encoder": asdict(EncoderSettings()),
     }
 

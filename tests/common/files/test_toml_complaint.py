@@ -17,7 +17,7 @@ from tests.helpers.refusal import refusal
         ("bind = 5555", "bind = 5555; valid: a text"),
         ("model = 3", "model = 3; valid: a path, as a text"),
         ('link_model = "x"', 'link_model = "x"; valid: "datagram" or "stream"'),
-        ("camera = 3", "camera = 3; valid: a table with frame_sd_m, mean_m, sd_m"),
+        ("camera = 3", "camera = 3; valid: a table with frame_sd_m, mean_m, sd_m, unseen_m_s"),
         ('[camera]\nsd_m = "wide"', 'camera.sd_m = "wide"; valid: 0 to 1'),
         (
             "kinematic_mean_m = [1, 2]",
