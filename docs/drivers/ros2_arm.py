@@ -18,7 +18,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
-PERIOD_S, LEAD_RAD, HELD_RAD, SILENT_S, AHEAD_NS, DRIFT_S = 0.01, 0.1, 0.02, 0.1, 50_000_000, 1e-5
+PERIOD_S, LEAD_RAD, SILENT_S, AHEAD_NS, DRIFT_S = 0.01, 0.1, 0.1, 50_000_000, 1e-5
 KINDS = {"positions": Float64MultiArray, "trajectory": JointTrajectory}
 
 
@@ -35,9 +35,9 @@ class Arm(Node):
         self.kind, self.topic, self.out = kind, topic, self.create_publisher(KINDS[kind], topic, 1)
         self.create_subscription(JointState, "/joint_states", self.see, qos_profile_sensor_data)
         self.create_timer(PERIOD_S, self.turn)
-        self.socket = zmq.Context().socket(zmq.DEALER)
+        self.socket, address = zmq.Context().socket(zmq.DEALER), said.get("address", "tcp://127.0.0.1:5601")
         self.socket.sndhwm, self.socket.linger = 2, 0  # old states are useless
-        self.socket.connect(said.get("address", "tcp://127.0.0.1:5601"))
+        self.socket.connect(address)
 
     def see(self, message: JointState) -> None:
         """Keep what a message says of each joint; it is as old as it comes later than the quickest ones."""
@@ -61,20 +61,18 @@ class Arm(Node):
             return
         at_s, here, speeds, loads = zip(*(self.seen[name] for name in self.joints), strict=True)
         valid_s, self.turned_s = min(now_s, newest["valid_until_s"]) - since_s, now_s
-        stops = valid_s <= 0.0
-        if now_s - min(at_s) > SILENT_S:
-            self.goals = ()
-        elif self.goals if stops else any(newest["joint_velocities"]):
-            told, lead = ([0.0] * len(here), HELD_RAD) if stops else (newest["joint_velocities"], LEAD_RAD)
-            ways = zip(self.goals or here, told, here, strict=True)
-            goals = [min(max(goal + speed * valid_s, at - lead), at + lead) for goal, speed, at in ways]
-            self.goals = () if stops else goals
-            point = JointTrajectoryPoint(positions=goals)
-            point.time_from_start.nanosec, path = AHEAD_NS, JointTrajectory(joint_names=self.joints, points=[point])
-            self.out.publish(Float64MultiArray(data=goals) if self.kind == "positions" else path)
+        if valid_s <= 0.0 or not self.goals or now_s - min(at_s) > SILENT_S:
+            self.goals = here
+        elif any(newest["joint_velocities"]):
+            ways = zip(self.goals, newest["joint_velocities"], here, strict=True)
+            self.goals = [min(max(goal + speed * valid_s, at - LEAD_RAD), at + LEAD_RAD) for goal, speed, at in ways]
+            point = JointTrajectoryPoint(positions=self.goals)
+            point.time_from_start.nanosec = AHEAD_NS
+            path = JointTrajectory(joint_names=self.joints, points=[point])
+            self.out.publish(Float64MultiArray(data=self.goals) if self.kind == "positions" else path)
         alone = self.count_publishers(self.topic) == 1 and self.count_subscribers(self.topic) > 0
-        why = "" if alone else f"{self.topic}: valid: this sender alone, and a controller"
-        self.state |= {"condition": "ready" if alone else "fault", "condition_text": why}
+        self.state["condition"] = "ready" if alone else "fault"
+        self.state["condition_text"] = "" if alone else f"{self.topic}: valid: this sender alone, and a controller"
         self.state |= {"sent_s": (sent_s := time.monotonic()), "measured_s": min(at_s), "echo_s": newest["sent_s"]}
         self.state |= {"held_s": sent_s - self.read_s, "joint_positions": here, "joint_velocities": speeds}
         self.state |= {"sequence": self.state["sequence"] + 1} | ({"joint_loads": loads} if self.loads else {})
@@ -85,6 +83,8 @@ class Arm(Node):
 if __name__ == "__main__":
     kind, topic, joints, *more = sys.argv[1:]
     if kind not in KINDS or "velocit" in topic:
-        sys.exit(f"{kind} {topic}: a velocity controller goes on if this process dies; valid: positions, trajectory")
+        sys.exit(
+            f"{kind} {topic}: a controller of velocities goes on if this process dies; valid: positions, trajectory"
+        )
     rclpy.init()
     rclpy.spin(Arm(kind, topic, joints.split(","), dict(word.split("=", 1) for word in more)))
