@@ -181,13 +181,16 @@ def build_parts(
 def take_limits(settings: RobotSettings, parts: SceneParts, drivers: ConnectedDrivers) -> tuple[RobotSettings, str]:
     """Take the limits that the arm's driver says, where the settings give none.
 
-    Return the settings with them, as a recording keeps them, and a note for a person; no note without --arm.
+    Return the settings with them, and a note for a person. ConfigurationError if both make an arm that is too late.
     """
     if not drivers.has_arm:
         return settings, ""
     said, given = drivers.said_limits(), settings.arm_limits
     limits = given.unless_known(said)
-    parts.limits.take(limits.of_joints(parts.arm.joint_count))
+    try:
+        parts.limits.take(limits.of_joints(parts.arm.joint_count))
+    except ValueError as error:  # each is valid, and both together are not
+        raise ConfigurationError(f"{error}; {given.sources(said)}") from None
     drivers.limits_taken()
     return replace(settings, arm_limits=limits), f"the arm's limits: {given.sources(said)}"
 

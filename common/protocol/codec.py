@@ -21,7 +21,7 @@ PROTOCOL_VERSION = 12
 4: a field for each trigger in place of stiffness and contact, and the compensating side in each command. 6: Watch.
 7: packed form of stiffness and telemetry. 8: onset distances around the gripper, and whether the held object is
 supported. 9: `Around.changes`. 10: `SceneState.near`, `SceneShapes.eye` and `Mark`.
-11: what a viewer keeps up with, in Watch. 12: the condition of a driver's arm, and `Eye.middle`."""
+11: what a viewer keeps up with, in Watch. 12: `StiffnessUpdate.response_s`, `Eye.stretch` and `Eye.middle`."""
 MAXIMUM_BYTES = 4096
 """Longest control payload that is decoded, in bytes: eight times the largest message."""
 VIEW_MAXIMUM_BYTES: Final = 4 * 1024 * 1024

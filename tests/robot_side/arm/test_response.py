@@ -1,12 +1,18 @@
 """A simulated arm with limited jerk and latency stops later by what `response_s` says, and never more."""
 
+from typing import cast
+
 import numpy as np
 import pytest
 
+from common.errors import ConfigurationError
 from robot_side.arm.limits import ArmLimits
 from robot_side.drivers.mujoco.arm import MujocoArm
 from robot_side.drivers.mujoco.encoders import Encoder
 from robot_side.drivers.mujoco.scene import load_scene
+from robot_side.drivers.remote.connected_drivers import ConnectedDrivers
+from robot_side.parts import build_parts, take_limits
+from robot_side.settings import RobotSettings
 
 TICK_S = 0.002
 
@@ -52,3 +58,22 @@ def test_limits_of_another_number_of_joints_are_refused() -> None:
 def test_what_the_settings_say_counts_before_what_the_driver_says() -> None:
     limits = ArmLimits(velocity_rad_s=1.0).unless_known(ArmLimits((2.0, 3.0), (4.0, 5.0), latency_s=0.1))
     assert limits == ArmLimits(1.0, (4.0, 5.0), latency_s=0.1)
+
+
+class SaysSlow:
+    """Drivers of an arm of which one says a great acceleration."""
+
+    has_arm = True
+
+    def said_limits(self) -> ArmLimits:
+        return ArmLimits(acceleration_rad_s2=1000.0)
+
+    def limits_taken(self) -> None:
+        raise AssertionError("limits that cannot be must not be taken")
+
+
+def test_limits_that_only_together_are_too_late_are_told_in_a_line() -> None:
+    settings = RobotSettings(arm_limits=ArmLimits(jerk_rad_s3=10.0))
+    parts = build_parts(settings, 1, "clock")
+    with pytest.raises(ConfigurationError, match="valid: up to 1 s; jerk_rad_s3 from the settings"):
+        take_limits(settings, parts, cast(ConnectedDrivers, SaysSlow()))
