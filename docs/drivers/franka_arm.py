@@ -62,7 +62,7 @@ def main(robot_address: str, address: str = "tcp://127.0.0.1:5601") -> None:
             measured_s, seen, newest, told = time.monotonic(), robot.state, shared["newest"], mode
             left_s, mode, hand = newest["valid_until_s"] - measured_s, seen.robot_mode.name, shared["hand"]
             if robot.is_in_control or (left_s > 0.0 and any(newest["joint_velocities"])):
-                way, hold = franky.JointVelocityWaypoint, franky.Duration(max(int(1e3 * left_s), 1))
+                way, hold = franky.JointVelocityWaypoint, franky.Duration(int(1e3 * max(left_s, 1e-3)))
                 ways = [way(newest["joint_velocities"], hold_target_duration=hold)] if left_s > 0.0 else []
                 robot.move(franky.JointVelocityWaypointMotion([*ways, way([0.0] * 7)]), asynchronous=True)
             elif mode == told == "Reflex":  # the robot side has been told, and nobody drives

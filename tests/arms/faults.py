@@ -121,6 +121,8 @@ FAULTS: Final = (
     Fault("the driver stands still for 0.3 s", _held("driver", 0.3)),
     Fault("SIGSTOP of the peer", _stop("peer", signal.SIGSTOP), _stop("peer", signal.SIGCONT)),
     Fault("the peer stands still for 0.3 s", _held("peer", 0.3)),
+    Fault("kill -9 of the robot side, which starts anew", Trial.kill_robot, Trial.begin_robot),
+    Fault("a reflex of the arm", _order("reflex"), peers=("franka",)),
     Fault("states are silent for 2 s", _order("silent 2"), peers=("ros2",)),
     Fault("states are 0.3 s late for 2 s", _order("late 0.3 2"), peers=("ros2",)),
     Fault("a second sender of the same joints", _second("states", *STARTS), peers=("ros2",)),

@@ -7,7 +7,6 @@ import socket
 import subprocess
 import time
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
@@ -103,23 +102,37 @@ class Trial:
         self.peer: Program | None = None
         self.driver: Program | None = None
         self.operator: SideProcess | None = None
-        self._stack, self._programs, self._model = ExitStack(), 0, model
+        self.robot: SideProcess | None = None
+        self._robot_since_s = 0.0
+        self._programs, self._model = 0, model
         self._log = PositionLog(folder / "positions.csv")
         self.summary = folder / "robot.json"
 
     def __enter__(self) -> Self:
+        self.begin_robot()
+        return self
+
+    def begin_robot(self) -> None:
+        """Start the robot side."""
         arguments = ["--bind=tcp://127.0.0.1:0", f"--arm={self.address}", "--no-cameras", f"--summary={self.summary}"]
         if self._model is not None:
             arguments += [f"--model={self._model}", "--site=pinch"]
-        self.robot = self._stack.enter_context(SideProcess("robot_side", "robot", arguments))
-        return self
+        self._robot_since_s = time.monotonic()
+        self.robot = SideProcess("robot_side", "robot", arguments)
+
+    def kill_robot(self) -> None:
+        """End the robot side as kill -9 does."""
+        assert self.robot is not None
+        os.kill(self.robot.process_id, signal.SIGKILL)
+        self.robot.__exit__()
+        self.robot = None
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        if self.operator is not None:
-            self.operator.__exit__()
-        self._stack.close()
+        for side in (self.operator, self.robot):
+            if side is not None:
+                side.__exit__()
         for program in (self.driver, self.peer):
             if program is not None:
                 program.send(signal.SIGCONT)
@@ -182,7 +195,8 @@ class Trial:
 
     @property
     def _listening(self) -> dict[str, Any]:
-        return next((event for _, _, event in self.events if event["event"] == "listening"), {})
+        said = (event for at_s, _, event in self.events if at_s >= self._robot_since_s)
+        return next((event for event in said if event["event"] == "listening"), {})
 
     def _instead(self) -> str:
         programs = [f"{one.said.name}: {one.heard()[-200:]}" for one in (self.peer, self.driver) if one is not None]

@@ -8,12 +8,16 @@ from typing import TextIO
 
 
 def log_positions(path: str, positions: Callable[[], Sequence[float]], period_s: float = 0.01) -> None:
-    """Append a line with the time and the joints' positions each `period_s`, in a thread; the clock is monotonic."""
+    """Append a line with the time and the joints' positions each `period_s`, in a thread; the clock is monotonic.
+
+    No line is written while there are no positions.
+    """
 
     def write(log: TextIO) -> None:
         while True:
-            values = ",".join(f"{value:.6f}" for value in positions())
-            log.write(f"{time.monotonic():.4f},{values}\n")
+            if here := positions():
+                values = ",".join(f"{value:.6f}" for value in here)
+                log.write(f"{time.monotonic():.4f},{values}\n")
             time.sleep(period_s)
 
     threading.Thread(target=write, args=(open(path, "w", buffering=1, encoding="ascii"),), daemon=True).start()  # noqa: SIM115, PTH123  # as long as the process
