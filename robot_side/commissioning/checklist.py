@@ -20,6 +20,7 @@ from robot_side.commissioning.joint_checks import (
 )
 from robot_side.commissioning.procedure import SLIDE_M_PER_RAD, Procedure, Result, Watch, carry_out
 from robot_side.drivers.mujoco.viewpoints import stick_frames
+from robot_side.settings import RobotSettings
 
 _LEAST_STATES_PER_S: Final = 30.0
 _OLD_S: Final = 0.05
@@ -30,11 +31,6 @@ _BLOCK_M: Final = 0.002
 _HEAVY: Final = 0.5
 _LIMITS: Final = (("speed", "velocity_rad_s"), ("acceleration", "acceleration_rad_s2"), ("latency", "latency_s"))
 _MEASURE: Final = "feelahead-robot --measure-limits"
-_KEPT: Final = {
-    "workspace box": ("arm_workspace", "[arm] workspace"),
-    "keep-out boxes": ("arm_keep_out", "[arm] keep_out"),
-    "speed cap": ("arm_fastest_m_s", "[arm] fastest_m_s"),
-}
 
 
 class Check(NamedTuple):
@@ -73,9 +69,7 @@ def run_checks(one: ArmAlone, ask: Ask, block_m: float | None) -> Iterator[Check
     yield from _states(one, heard)
     yield _limits(one)
     yield _loads(one, heard)
-    for name, (field, key) in _KEPT.items():
-        given = getattr(one.settings, field, None)
-        yield Check(name, True, str(given)) if given else Check(name, None, "not set", f"{key} in --config")
+    yield from _bounds(one.settings)
     base = stick_frames(one.parts.scene).base
     yield _place(one, heard, ask, base)
     for joint, name in enumerate(one.joint_names):
@@ -102,7 +96,7 @@ def _states(one: ArmAlone, heard: Heard) -> Iterator[Check]:
     yield Check(
         "noise of readings",
         True if quiet else None,
-        f"up to {1e3 * heard.noise_rad[worst]:.2g} mrad ({one.joint_names[worst]}); {1e3 * assumed:.2g} are assumed",
+        f"up to {1e3 * heard.noise_rad[worst]:.2f} mrad ({one.joint_names[worst]}); {1e3 * assumed:.2g} are assumed",
         None if quiet else f"--encoder.sigma-rad {heard.noise_rad[worst]:.1e}",
     )
 
@@ -119,6 +113,17 @@ def _limits(one: ArmAlone) -> Check:
     said = ", ".join(f"{what}: {source}" for what, source in sources.items())
     known = "assumed" not in sources.values()
     return Check("limits", True if known else None, said, None if known else _MEASURE)
+
+
+def _bounds(settings: RobotSettings) -> Iterator[Check]:
+    box, kept_out, cap_m_s = settings.arm_workspace, settings.arm_keep_out, settings.arm_fastest_m_s
+    around = ", ".join(str(one.center_m) for one in kept_out)
+    for name, key, said in (
+        ("workspace box", "workspace", box and f"from {box.lower_m} m to {box.upper_m} m in the world"),
+        ("keep-out boxes", "keep_out", around and f"around {around} m in the world"),
+        ("speed cap", "fastest_m_s", cap_m_s and f"{cap_m_s:g} m/s"),
+    ):
+        yield Check(name, True, said) if said else Check(name, None, "not set", f"[arm] {key} in --config")
 
 
 def _loads(one: ArmAlone, heard: Heard) -> Check:

@@ -117,7 +117,7 @@ class RunsOfJoint:
         away, room = self._way(float(self._begin[self._joint]))
         runs: list[Run] = []
         speed = min(FIRST_RAD_S * self._scale, self._fastest)
-        stopping = 0.3 * speed + 0.5 * speed * speed / self._scale
+        stopping, repeated = 0.3 * speed + 0.5 * speed * speed / self._scale, 0.0
         while _WAYS * stopping < _USED * room:
             seen = yield from self._back(seen)
             begin = float(self._begin[self._joint])
@@ -130,6 +130,10 @@ class RunsOfJoint:
             if len(runs) < before + 2:
                 break
             peak = min(run.peak_rad_s for run in runs[-2:])
+            if peak < _REACHED * speed and speed > repeated:  # a machine that paused spoils a run, but hardly two
+                repeated = speed
+                del runs[before:]
+                continue
             if speed >= self._fastest or peak < _REACHED * speed:
                 break
             faster = min(_FASTER * speed, self._fastest)

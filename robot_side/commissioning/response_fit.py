@@ -96,8 +96,8 @@ def fitted(measured: JointRuns) -> JointResponse:
     fastest = max(min(reached, speed, up * held) for held, speed, reached in fits)
     rounding = min(up, down) / jerk
     ramps_s = [reached / up + rounding + _CRUISES_S for _, _, reached in fits]
-    held_back = any(
-        reached + most < _HELD * speed and held > ramp_s
+    held_back = any(  # a slower run that fell short was disturbed, as a faster one followed
+        speed == speeds.max() and reached + most < _HELD * speed and held > ramp_s
         for (held, speed, reached), ramp_s, most in zip(fits, ramps_s, surely, strict=True)
     )
     # An acceleration that the jerk does not let the arm come to cannot be told.

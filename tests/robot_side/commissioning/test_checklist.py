@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from common.arrays import FloatArray
+from robot_side.arm.bounds import Workspace
 from robot_side.arm.limits import ArmLimits
 from robot_side.arm.port import Arm, ArmState
 from robot_side.commissioning.arm_alone import ArmAlone
@@ -60,7 +61,7 @@ def parts() -> SceneParts:
 
 
 def checked(
-    parts: SceneParts, arm: Arm, no: Sequence[str] = (), block_m: float | None = BLOCK_M, **settings: ArmLimits
+    parts: SceneParts, arm: Arm, no: Sequence[str] = (), block_m: float | None = BLOCK_M, **settings: object
 ) -> tuple[dict[str, Check], list[str]]:
     """Return the checks by name, and the questions; no: beginnings of questions that the person denies."""
     asked: list[str] = []
@@ -127,7 +128,11 @@ def test_slow_states_a_wrong_gripper_and_loads_are_said(parts: SceneParts) -> No
     arm = fresh()
     arm.period_s, arm.block_m, arm.loads_nm = 0.06, 0.03, np.array([0.1, 8.0, 0.0, 0.0, 0.0, 0.0])
     limits = ArmLimits(velocity_rad_s=1.0, acceleration_rad_s2=4.0, latency_s=0.05, load_nm=10.0)
-    found, _ = checked(parts, arm, arm_limits=limits)
+    box = Workspace((0.1, -0.4, 0.0), (0.7, 0.4, 0.8))
+    found, _ = checked(parts, arm, arm_limits=limits, arm_workspace=box, arm_fastest_m_s=0.1)
+    assert found["workspace box"].said == "from (0.1, -0.4, 0.0) m to (0.7, 0.4, 0.8) m in the world"
+    assert found["speed cap"].said == "0.1 m/s"
+    assert found["keep-out boxes"].good is None
     assert found["states"].good is False
     assert found["age of states"].good is None
     assert found["limits"].good is True

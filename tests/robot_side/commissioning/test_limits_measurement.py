@@ -29,6 +29,7 @@ class FollowingArm(Arm):
         self.condition: str | None = None
         self.wall_rad, self.pressed_s = np.inf, 0.0
         self.old_s, self.fails_beyond_rad = 0.0, np.inf
+        self.disturbed_s, self.disturbed_share = (np.inf, np.inf), 0.0
 
     def command(self, joint_velocity_rad_s: np.ndarray, valid_until_s: float) -> None:
         assert valid_until_s > self.now_s
@@ -41,7 +42,9 @@ class FollowingArm(Arm):
     def state(self, now_s: float) -> ArmState:
         passed_s, self.now_s = now_s - self.now_s, now_s
         most = self.acceleration_rad_s2 * passed_s
-        self.velocity_rad_s = self.velocity_rad_s + np.clip(self.told - self.velocity_rad_s, -most, most)
+        disturbed = self.disturbed_s[0] < now_s < self.disturbed_s[1]
+        told = self.disturbed_share * self.told if disturbed else self.told
+        self.velocity_rad_s = self.velocity_rad_s + np.clip(told - self.velocity_rad_s, -most, most)
         there_rad = self.joints_rad + passed_s * self.velocity_rad_s
         self.joints_rad = np.minimum(there_rad, self.wall_rad)
         if (there_rad > self.joints_rad).any():
@@ -59,6 +62,19 @@ def known(limits: JointLimits, settings: ArmLimits | None = None, driver: ArmLim
 def measured(arm: Arm, room_rad: float = 0.35, **limits: float) -> list[Measured]:
     of_joints = ArmLimits(**limits).of_joints(2)
     return list(measure_limits(arm, NAMES, known(of_joints), VirtualPace(), room_rad, OLDEST_S, lambda _: None))
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(("disturbed_s", "share"), [((0.9, 1.3), 0.0), ((0.5, 2.0), 0.8)])
+def test_one_run_that_a_busy_machine_disturbs_does_not_lower_the_speed(
+    disturbed_s: tuple[float, float], share: float
+) -> None:
+    arm = FollowingArm()
+    arm.acceleration_rad_s2, arm.disturbed_s, arm.disturbed_share = 8.0, disturbed_s, share
+    response = measured(arm, velocity_rad_s=2.0)[0].response
+    assert response is not None
+    assert response.velocity_rad_s.at_least
+    assert response.velocity_rad_s.value > 1.0
 
 
 @pytest.mark.long
