@@ -12,13 +12,14 @@ import time
 import msgpack
 import rclpy
 import zmq
+from builtin_interfaces.msg import Duration
 from rclpy.node import Node
 from rclpy.qos import qos_profile_sensor_data
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
-PERIOD_S, LEAD_RAD, SILENT_S, AHEAD_NS, DRIFT_S = 0.01, 0.1, 0.1, 50_000_000, 1e-5
+PERIOD_S, LEAD_RAD, SILENT_S, DOUBT_S, AHEAD_NS, DRIFT_S = 0.01, 0.1, 0.1, 1.0, 50_000_000, 1e-5
 KINDS = {"positions": Float64MultiArray, "trajectory": JointTrajectory}
 
 
@@ -27,25 +28,26 @@ class Arm(Node):
 
     def __init__(self, kind: str, topic: str, joints: list[str], said: dict[str, str]) -> None:
         super().__init__("feelahead_arm")
-        self.joints, self.seen, self.least_s, self.goals, self.loads = joints, {}, {}, (), said.get("loads") == "yes"
-        self.newest, self.read_s = {"valid_until_s": -math.inf, "sent_s": None}, time.monotonic()
-        numbers = {name: float(value) for name, value in said.items() if "_s" in name}
-        limits = {name: one if name == "latency_s" else [one] * len(joints) for name, one in numbers.items()}
-        self.turned_s, self.state = self.read_s, {"version": 1, "sequence": 0, "limits": limits}
+        self.joints, self.seen, self.least_s, self.loads = joints, {}, {}, said.pop("loads", "no") == "yes"
+        self.newest, self.read_s, self.goals = {"valid_until_s": -math.inf, "sent_s": None}, time.monotonic(), ()
+        self.socket, address = zmq.Context().socket(zmq.DEALER), said.pop("address", "tcp://127.0.0.1:5601")
+        self.socket.sndhwm, self.socket.linger = 2, 0  # old states are useless
+        self.socket.connect(address)
+        limits = {name: float(one) if name == "latency_s" else [float(one)] * len(joints) for name, one in said.items()}
+        self.turned_s, self.doubt_s, self.state = self.read_s, 0.0, {"version": 1, "sequence": 0, "limits": limits}
         self.kind, self.topic, self.out = kind, topic, self.create_publisher(KINDS[kind], topic, 1)
         self.create_subscription(JointState, "/joint_states", self.see, qos_profile_sensor_data)
         self.create_timer(PERIOD_S, self.turn)
-        self.socket, address = zmq.Context().socket(zmq.DEALER), said.get("address", "tcp://127.0.0.1:5601")
-        self.socket.sndhwm, self.socket.linger = 2, 0  # old states are useless
-        self.socket.connect(address)
 
-    def see(self, message: JointState) -> None:
+    def see(self, message: JointState, about: dict[str, int]) -> None:
         """Keep what a message says of each joint; it is as old as it comes later than the quickest ones."""
         stamp_s, now_s = message.header.stamp.sec + 1e-9 * message.header.stamp.nanosec, time.monotonic()
-        loads = message.effort or [0.0] * len(message.name)
+        number, loads = about["publication_sequence_number"], message.effort or [0.0] * len(message.name)
         for name, *values in zip(message.name, message.position, message.velocity, loads, strict=False):
+            if number < self.seen.get(name, (0,))[-1] and name in self.joints:  # by another sender, or it began anew
+                self.doubt_s = now_s + DOUBT_S
             self.least_s[name] = min(self.least_s.get(name, math.inf) + DRIFT_S, now_s - stamp_s)
-            self.seen[name] = (stamp_s + self.least_s[name], *values)
+            self.seen[name] = (stamp_s + self.least_s[name], *values, number)
 
     def turn(self) -> None:
         """Obey the newest command, and send a state."""
@@ -59,20 +61,20 @@ class Arm(Node):
         if missing := {*self.joints} - self.seen.keys():
             self.get_logger().warning(f"/joint_states lacks {missing}", throttle_duration_sec=5.0)
             return
-        at_s, here, speeds, loads = zip(*(self.seen[name] for name in self.joints), strict=True)
+        at_s, here, speeds, loads, _ = zip(*(self.seen[name] for name in self.joints), strict=True)
         valid_s, self.turned_s = min(now_s, newest["valid_until_s"]) - since_s, now_s
-        if valid_s <= 0.0 or not self.goals or now_s - min(at_s) > SILENT_S:
+        if valid_s <= 0.0 or not self.goals or now_s - min(at_s) > SILENT_S or now_s < self.doubt_s:
             self.goals = here
         elif any(newest["joint_velocities"]):
             ways = zip(self.goals, newest["joint_velocities"], here, strict=True)
             self.goals = [min(max(goal + speed * valid_s, at - LEAD_RAD), at + LEAD_RAD) for goal, speed, at in ways]
-            point = JointTrajectoryPoint(positions=self.goals)
-            point.time_from_start.nanosec = AHEAD_NS
+            point = JointTrajectoryPoint(positions=self.goals, time_from_start=Duration(nanosec=AHEAD_NS))
             path = JointTrajectory(joint_names=self.joints, points=[point])
             self.out.publish(Float64MultiArray(data=self.goals) if self.kind == "positions" else path)
         alone = self.count_publishers(self.topic) == 1 and self.count_subscribers(self.topic) > 0
-        self.state["condition"] = "ready" if alone else "fault"
-        self.state["condition_text"] = "" if alone else f"{self.topic}: valid: this sender alone, and a controller"
+        wrong = "" if alone else f"{self.topic}: valid: this sender alone, and a controller"
+        wrong = "/joint_states: two nodes send the same joint; valid: one" if now_s < self.doubt_s else wrong
+        self.state |= {"condition": "fault" if wrong else "ready", "condition_text": wrong}
         self.state |= {"sent_s": (sent_s := time.monotonic()), "measured_s": min(at_s), "echo_s": newest["sent_s"]}
         self.state |= {"held_s": sent_s - self.read_s, "joint_positions": here, "joint_velocities": speeds}
         self.state |= {"sequence": self.state["sequence"] + 1} | ({"joint_loads": loads} if self.loads else {})
@@ -83,8 +85,6 @@ class Arm(Node):
 if __name__ == "__main__":
     kind, topic, joints, *more = sys.argv[1:]
     if kind not in KINDS or "velocit" in topic:
-        sys.exit(
-            f"{kind} {topic}: a controller of velocities goes on if this process dies; valid: positions, trajectory"
-        )
+        sys.exit(f"{kind} {topic}: of velocities, which goes on if this process dies; valid: positions, trajectory")
     rclpy.init()
     rclpy.spin(Arm(kind, topic, joints.split(","), dict(word.split("=", 1) for word in more)))

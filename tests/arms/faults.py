@@ -45,6 +45,8 @@ def suffer(trial: Trial, fault: Fault) -> Outcome:
     trial.drive()
     began_s = time.monotonic()
     program = fault.do(trial)
+    if program is not None:  # its own start is no part of the fault
+        began_s = time.monotonic()
     trial.watch(LASTS_S)
     seen = trial.positions().between(began_s, time.monotonic())
     fault.undo(trial)
@@ -100,7 +102,12 @@ def _order(line: str) -> Callable[[Trial], None]:
 
 
 def _second(*words: str) -> Callable[[Trial], Program]:
-    return lambda trial: trial.program("-m", "tests.arms.peers.second_sender", *words)
+    def begin(trial: Trial) -> Program:
+        program = trial.program("-m", "tests.arms.peers.second_sender", *words)
+        trial.wait_until("the second sender sends", lambda: "sends" in program.heard())
+        return program
+
+    return begin
 
 
 def _second_driver(trial: Trial) -> Program:
@@ -112,7 +119,7 @@ def _second_driver(trial: Trial) -> Program:
 
 
 def _topic(trial: Trial) -> Program:
-    return trial.program("-m", "tests.arms.peers.second_sender", "goals", TOPIC[trial.kind.controls], *STARTS)
+    return _second("goals", TOPIC[trial.kind.controls], *STARTS)(trial)
 
 
 FAULTS: Final = (

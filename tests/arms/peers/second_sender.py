@@ -1,6 +1,6 @@
 """Another node under ROS 2 that says it is the arm (`states`), or that commands it (`goals TOPIC`), 100 times a second.
 
-Further arguments: JOINT=POSITION ...
+Further arguments: JOINT=POSITION ... It says `sends` once somebody hears it.
 """
 
 import sys
@@ -19,6 +19,8 @@ def main(what: str, *joints: str) -> None:
     out = node.create_publisher(kind, topic, 1)
 
     def send() -> None:
+        if node.count_subscribers(out.topic_name):
+            print("sends", flush=True)
         if what == "states":
             state = JointState(name=list(said), position=list(said.values()), velocity=[0.0] * len(said))
             state.header.stamp = node.get_clock().now().to_msg()
