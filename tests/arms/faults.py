@@ -24,6 +24,8 @@ class Fault:
     peers: tuple[str, ...] = ("franka", "ros2")
     moves_on: bool = False
     """Whether it need not stop the arm"""
+    reads: str = ""
+    """Words that the operator reads"""
 
 
 @dataclass(frozen=True)
@@ -45,8 +47,8 @@ def suffer(trial: Trial, fault: Fault) -> Outcome:
     trial.drive()
     began_s = time.monotonic()
     program = fault.do(trial)
-    if program is not None:  # its own start is no part of the fault
-        began_s = time.monotonic()
+    if program is not None and "sends" in (words := program.heard().split()):
+        began_s = float(words[words.index("sends") + 1])  # its own start is no part of the fault
     trial.watch(LASTS_S)
     seen = trial.positions().between(began_s, time.monotonic())
     fault.undo(trial)
@@ -129,11 +131,11 @@ FAULTS: Final = (
     Fault("SIGSTOP of the peer", _stop("peer", signal.SIGSTOP), _stop("peer", signal.SIGCONT)),
     Fault("the peer stands still for 0.3 s", _held("peer", 0.3)),
     Fault("kill -9 of the robot side, which starts anew", Trial.kill_robot, Trial.begin_robot),
-    Fault("a reflex of the arm", _order("reflex"), peers=("franka",)),
+    Fault("a reflex of the arm", _order("reflex"), peers=("franka",), reads="protective stop"),
     Fault("states are silent for 2 s", _order("silent 2"), peers=("ros2",)),
     Fault("states are 0.3 s late for 2 s", _order("late 0.3 2"), peers=("ros2",)),
-    Fault("a second sender of the same joints", _second("states", *STARTS), peers=("ros2",)),
-    Fault("a second sender of goals", _topic, peers=("ros2",)),
+    Fault("a second sender of the same joints", _second("states", *STARTS), peers=("ros2",), reads="two nodes"),
+    Fault("a second sender of goals", _topic, peers=("ros2",), reads="this sender alone"),
     Fault("a second driver", _second_driver, moves_on=True),
     Fault("kill -9 of the peer, which starts anew", _kill_peer, Trial.begin_peer),
 )

@@ -67,6 +67,7 @@ def test_the_arm_stands_after_a_fault_and_comes_back(running: Trial, fault: Faul
     if not fault.moves_on:
         assert outcome.stands_after_s is None or outcome.stands_after_s < STANDS_WITHIN_S
         assert outcome.reads != "armed"
+        assert fault.reads in outcome.reads
     assert outcome.back
 
 

@@ -44,6 +44,11 @@ class Servo:
         self.position = position
         self.turn(0.0)
 
+    @property
+    def goal(self) -> int:
+        """Goal in steps."""
+        return int.from_bytes(self.table[_GOAL : _GOAL + 2], "little")
+
     def limit(self, least: int, most: int) -> None:
         """Write the ends of the range, in steps, as calibrating does."""
         self._put(9, least)
@@ -52,8 +57,7 @@ class Servo:
     def turn(self, passed_s: float) -> None:
         """Turn the shaft for a short time towards the goal."""
         if self.table[_TORQUE]:
-            goal = self.table[_GOAL] | self.table[_GOAL + 1] << 8
-            wanted = (goal - self.position) * (1.0 - math.exp(-passed_s / _LAG_S))
+            wanted = (self.goal - self.position) * (1.0 - math.exp(-passed_s / _LAG_S))
             most = _TOP_STEPS_S * passed_s
             self.position += min(max(wanted, -most), most)
         self._put(_POSITION, round(self.position))
@@ -74,6 +78,8 @@ class Servos:
     def __init__(self, positions: Sequence[float]) -> None:
         """positions: of the servos 1, 2 and so on, in steps."""
         self.by_number = {number: Servo(number, where) for number, where in enumerate(positions, start=1)}
+        self.commanded: list[list[int]] = []
+        """Goals of all servos, in steps, after each packet that wrote goals"""
         self._pending = b""
 
     def turn(self, passed_s: float) -> None:
@@ -102,6 +108,8 @@ class Servos:
             for at in range(2, len(rest), rest[1] + 1):
                 if (one := self.by_number.get(rest[at])) is not None:
                     one.write(rest[0], rest[at + 1 : at + 1 + rest[1]])
+            if rest[0] == _GOAL:
+                self.commanded.append([one.goal for one in self.by_number.values()])
             return b""
         called = list(self.by_number.values()) if number == _EVERYBODY else [self.by_number.get(number)]
         said = b""

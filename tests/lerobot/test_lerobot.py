@@ -1,13 +1,18 @@
 """LeRobot 0.6.1 itself on an emulated bus, driven by both sides: make test-lerobot."""
 
+import json
 import subprocess
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 
 from tests.helpers.machines.waiting import LIMIT_S
 from tests.lerobot.rig import DRIVERS, ENVIRONMENT, Rig, missing
+from tests.lerobot.servo_bus import CENTRE, STEP_RAD, STEPS
+from tests.lerobot.so101 import JAW_RAD, NAMES
 from tests.lerobot.table import LOOPS
 from tests.lerobot.trials import Outcome, approach, dead, deaf, fault, killed, stopped, unplugged
 
@@ -17,12 +22,17 @@ pytestmark = [
     pytest.mark.skipif(missing() is not None, reason=str(missing())),
 ]
 
+ONE_STEP = 0.1
+"""A little more than one step of a servo: 0.088° of a joint, 0.080 of the jaw's 100"""
+
 READ_DATASET = """
-import sys
+import json, sys
 from lerobot.datasets import LeRobotDataset
 dataset = LeRobotDataset("nobody/emulated", root=sys.argv[1])
-first, last = dataset[0]["action"], dataset[len(dataset) - 1]["action"]
-print(dataset.num_episodes, len(dataset), float((last - first).abs().max()))
+frames = [dataset[number] for number in range(len(dataset))]
+columns = {name: [frame[name].tolist() for frame in frames] for name in ("action", "observation.state", "timestamp")}
+names = {name: dataset.features[name]["names"] for name in ("action", "observation.state")}
+print(json.dumps({"episodes": dataset.num_episodes, "names": names, "fps": dataset.fps} | columns))
 """
 
 
@@ -32,10 +42,24 @@ def test_two_newtons_stop_before_the_wall(driver: str, tmp_path: Path) -> None:
     assert 0.002 < came.left_m < 0.5 * came.began_m, came
     if driver == "lerobot-record":
         reads = [str(ENVIRONMENT / "bin" / "python"), "-c", READ_DATASET, str(tmp_path / "dataset")]
-        said = subprocess.run(reads, capture_output=True, text=True, timeout=LIMIT_S, check=True).stdout.split()
-        assert int(said[0]) == 1
-        assert int(said[1]) > 10
-        assert float(said[2]) > 1.0, "no goal moved in the episode"
+        said = subprocess.run(reads, capture_output=True, text=True, timeout=LIMIT_S, check=True).stdout
+        the_dataset_is_what_was_commanded(json.loads(said.splitlines()[-1]), came.commanded)
+
+
+def the_dataset_is_what_was_commanded(found: dict[str, Any], commanded: list[list[int]]) -> None:
+    """Compare an episode with the goals that the servos got, in steps: of 360°, and of the jaw's range of 0 to 100."""
+    assert found["episodes"] == 1
+    assert found["names"] == {key: [f"{name}.pos" for name in NAMES] for key in ("action", "observation.state")}
+    actions, states = np.array(found["action"]), np.array(found["observation.state"])
+    goals = np.array(commanded, dtype=float)
+    print(f"{len(actions)} frames of {found['fps']} a second, {len(goals)} goals written")
+    assert len(actions) == len(goals) > 10
+    shut, wide = (round(CENTRE + angle / STEP_RAD) for angle in JAW_RAD)
+    goals[:, :-1] = (goals[:, :-1] - CENTRE) * 360.0 / (STEPS - 1)
+    goals[:, -1] = 100.0 * (goals[:, -1] - shut) / (wide - shut)
+    assert np.abs(actions - goals).max() < ONE_STEP
+    assert np.ptp(actions, axis=0).max() > 1.0, "no goal moved in the episode"
+    assert np.abs(states[-1] - actions[-1]).max() < 1.0, "the arm stands at its last goal"
 
 
 def struck(driver: str, folder: Path, strike: Callable[[Rig], None]) -> Outcome:

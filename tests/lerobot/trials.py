@@ -35,6 +35,8 @@ class Approach:
     refused: dict[str, int]
     """Number of states that the robot side refused, by reason"""
     read: list[str]
+    commanded: list[list[int]]
+    """Goals of all servos, in steps, each time that LeRobot wrote them to the bus"""
 
 
 @dataclass(frozen=True)
@@ -68,11 +70,11 @@ def approach(driver: str, folder: Path, seconds: float = 8.0) -> Approach:
         rig.operator.stop()
         connected_s = time.monotonic() - rig.connected_s
         rig.robot.stop()
-        left_m, read = rig.nearest_m(), rig.read
+        left_m, read, commanded = rig.nearest_m(), rig.read, rig.bus.servos.commanded
     summary: dict[str, Any] = json.loads((folder / "summary.json").read_text("utf-8"))
     arm = dict(summary["drivers"]["arm"])
     states_per_s = arm.pop("accepted") / connected_s
-    return Approach(left_m, began_m, 1e-3 * summary["loop_age_ms"]["p50"], states_per_s, arm, read)
+    return Approach(left_m, began_m, 1e-3 * summary["loop_age_ms"]["p50"], states_per_s, arm, read, commanded)
 
 
 def fault(driver: str, folder: Path, strike: Callable[[Rig], None]) -> Outcome:

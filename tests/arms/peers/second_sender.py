@@ -1,9 +1,11 @@
 """Another node under ROS 2 that says it is the arm (`states`), or that commands it (`goals TOPIC`), 100 times a second.
 
-Further arguments: JOINT=POSITION ... It says `sends` once somebody hears it.
+Further arguments: JOINT=POSITION ... It says `sends` and the time, in s of the monotonic clock,
+once somebody hears it.
 """
 
 import sys
+import time
 
 import rclpy
 from sensor_msgs.msg import JointState
@@ -18,9 +20,12 @@ def main(what: str, *joints: str) -> None:
     kind, topic = (JointState, "/joint_states") if what == "states" else (Float64MultiArray, joints[0])
     out = node.create_publisher(kind, topic, 1)
 
+    began: list[float] = []
+
     def send() -> None:
-        if node.count_subscribers(out.topic_name):
-            print("sends", flush=True)
+        if not began and node.count_subscribers(out.topic_name):
+            began.append(time.monotonic())
+            print("sends", *began, flush=True)
         if what == "states":
             state = JointState(name=list(said), position=list(said.values()), velocity=[0.0] * len(said))
             state.header.stamp = node.get_clock().now().to_msg()
