@@ -4,7 +4,7 @@ import signal
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 from tests.arms.trial import STARTS, TOPIC, Program, Trial
 
@@ -54,13 +54,20 @@ def suffer(trial: Trial, fault: Fault) -> Outcome:
     fault.undo(trial)
     if program is not None:
         program.kill()
-    reads = [f"{one['state']} {one['stopped_because'] or ''}".strip() for one in trial.statuses("operator", began_s)]
+    reads = [_read(one) for one in trial.statuses("operator", began_s)]
     changed = [one for one in reads if one != "armed"]
     trial.watch(1.5)  # a new driver is heard after a second
     killed = len(seen.times_s) == 0 or seen.times_s[-1] < began_s + 0.1
     return Outcome(
         None if killed else seen.stands_after_s(), seen.moved_rad(), (changed or ["armed"])[0], comes_back(trial)
     )
+
+
+def _read(status: dict[str, Any]) -> str:
+    """Return what an operator reads first: that the link is lost, or else the arm's state, and why."""
+    if status["link"] == "lost":
+        return f"link lost {status['link_reason'] or ''}".strip()
+    return f"{status['state']} {status['stopped_because'] or ''}".strip()
 
 
 def comes_back(trial: Trial) -> bool:
