@@ -23,7 +23,9 @@ def main(what: str, *joints: str) -> None:
     began: list[float] = []
 
     def send() -> None:
-        if not began and node.count_subscribers(out.topic_name):
+        if not node.count_subscribers(out.topic_name):
+            return
+        if not began:
             began.append(time.monotonic())
             print("sends", *began, flush=True)
         if what == "states":
