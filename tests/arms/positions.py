@@ -39,13 +39,13 @@ class PositionLog:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self._rows: list[list[float]] = []
+        self._rows = np.zeros((0, 2))
         self._read_bytes = 0
 
     def begin_anew(self) -> None:
         """Forget what was read, for another peer."""
         self.path.unlink(missing_ok=True)
-        self._rows, self._read_bytes = [], 0
+        self._rows, self._read_bytes = np.zeros((0, 2)), 0
 
     def read(self) -> Positions:
         """Return all positions until now; a last line that is only half written is left to the next reading."""
@@ -55,9 +55,9 @@ class PositionLog:
                 whole = log.read().rpartition(b"\n")[0]
             if whole:
                 self._read_bytes += len(whole) + 1
-                self._rows += [[float(value) for value in line.split(b",")] for line in whole.split(b"\n")]
-        rows = np.array(self._rows)
-        return Positions(rows[:, 0], rows[:, 1:]) if self._rows else Positions(np.zeros(0), np.zeros((0, 1)))
+                new = np.array([[float(value) for value in line.split(b",")] for line in whole.split(b"\n")])
+                self._rows = np.vstack((self._rows, new)) if len(self._rows) else new
+        return Positions(self._rows[:, 0], self._rows[:, 1:])
 
 
 def least_gap_m(model_path: Path, positions: Positions, opening_m: float = 0.08) -> float:
