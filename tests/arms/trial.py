@@ -51,7 +51,7 @@ class Program:
 
     def __init__(self, command: Sequence[str], said: Path, environment: Mapping[str, str]) -> None:
         self.said = said
-        with said.open("a") as out:
+        with said.open("w") as out:
             self.process = subprocess.Popen(
                 command, stdout=out, stderr=out, stdin=subprocess.PIPE, text=True, cwd=ROOT, env=environment
             )
