@@ -5,10 +5,10 @@ from typing import Any, Final
 
 from robot_side.compiled.kernel import building_block, inlined
 from robot_side.compiled.vectors import Vector, load
+from robot_side.field.near_rows import next_row
 from robot_side.field.object_class import TARGET, TOUCHABLE
 from robot_side.field.scratch import SCRATCH, Bundles, Count, Error
-from robot_side.surroundings.bounds import passes
-from robot_side.surroundings.kinds.layout import HALF_SPACE, Contact
+from robot_side.surroundings.kinds.layout import Contact
 from robot_side.surroundings.scene_columns import SCENE, contact_with
 
 _ROUNDED: Final = 5e-3
@@ -27,13 +27,12 @@ def _meet_sphere(
     """
     scene, scratch = scene_at(bundles.scene), scratch_at(bundles.scratch)
     least, least_closing, center = math.inf, 0.0, load(scratch.spheres, i)
-    for k in range(rows):
-        row = scratch.rows[k]
-        near = min(reach, least)
-        if least > 0.0 and (scene.kinds[row] == HALF_SPACE or passes(center, along, near, scene.bounds, row, radius)):
-            found, closing = contact_with(scene, row, center, along, radius, near, clear)
-            if found < least:
-                least, least_closing = found, closing
+    place = next_row(scene, scratch, 0, rows, center, along, reach, radius)
+    while place < rows and least > 0.0:
+        found, closing = contact_with(scene, scratch.rows[place], center, along, radius, min(reach, least), clear)
+        if found < least:
+            least, least_closing = found, closing
+        place = next_row(scene, scratch, place + 1, rows, center, along, min(reach, least), radius)
     return least, least_closing
 
 
@@ -89,13 +88,14 @@ def enter(bundles: Bundles, pair: Any, rows: int, along: Vector, reach: float) -
         _write_entry(scratch.entries[0], scratch.rows[0], pair.contact, pair.closing)
         return 1
     count, center = 0, load(scratch.spheres, pair.sphere)
-    for k in range(rows):
-        row = scratch.rows[k]
-        if scene.kinds[row] == HALF_SPACE or passes(center, along, reach, scene.bounds, row, pair.radius):
-            enters, closing = contact_with(scene, row, center, along, pair.radius, reach, not pair.overlaps)
-            if enters <= reach:
-                _write_entry(scratch.entries[count], row, enters, closing)
-                count += 1
+    place = next_row(scene, scratch, 0, rows, center, along, reach, pair.radius)
+    while place < rows:
+        row = scratch.rows[place]
+        enters, closing = contact_with(scene, row, center, along, pair.radius, reach, not pair.overlaps)
+        if enters <= reach:
+            _write_entry(scratch.entries[count], row, enters, closing)
+            count += 1
+        place = next_row(scene, scratch, place + 1, rows, center, along, reach, pair.radius)
     return count
 
 

@@ -27,6 +27,8 @@ contact plane; 0 for a mesh with dents. lead: distance by which all strengths be
 along the motion, the object's approach, and the inflation if the sphere is uninflated. touchable: 1 for an object that
 is to be touched. expected: D_σ(P) - D_σ(0.5) for such an object, else 0."""
 
+ROWS_TOGETHER: Final = 16
+"""Number of kept rows in a block"""
 MOST_WORK: Final = 120_000
 """Pairs that touch and computed overlaps after which a tick's looks are cut short: 8 ms with boxes, 45 ms with
 tetrahedra. A gripper 20 mm above a table of 12 tetrahedra needs up to 82 000 while it moves, of two boxes 94 000."""
@@ -95,7 +97,14 @@ class ScratchColumns(NamedTuple):
     pairs: np.ndarray
     objects: IntArray
     bounds_m: FloatArray
+    next_pieces: IntArray
+    first_pieces: IntArray
+    surface_bounds_m: FloatArray
+    surface_volumes_m3: FloatArray
     rows: IntArray
+    row_bounds: FloatArray
+    row_blocks: FloatArray
+    no_inflation: FloatArray
     entries: np.ndarray
     samples: FloatArray
     overlap_gradient: FloatArray
@@ -106,7 +115,8 @@ class ScratchColumns(NamedTuple):
 
 SCRATCH: Final = Declared(
     ScratchColumns,
-    *(rows(4), FLAGS, rows(1), rows(1), rows(1), rows(4), NUMBERS, INDICES, records(PAIR), INDICES, NUMBERS, INDICES),
+    *(rows(4), FLAGS, rows(1), rows(1), rows(1), rows(4), NUMBERS, INDICES, records(PAIR), INDICES, NUMBERS),
+    *(INDICES, INDICES, NUMBERS, NUMBERS, INDICES, rows(4), rows(4), rows(1)),
     *(records(ENTRY), rows(2), NUMBERS, rows(STRENGTHS), NUMBERS, INDICES),
 )
 
@@ -134,8 +144,21 @@ class Scratch:
         self.objects: IntArray = np.zeros(objects, dtype=np.int64)
         self.bounds_m: FloatArray = np.zeros(objects)
         """Keys of `objects`, the queue of the objects within the reach, nearest first"""
+        self.next_pieces: IntArray = np.zeros(objects, dtype=np.int64)
+        """The next near piece of the same surface, for each near piece; -1 for the last"""
+        self.first_pieces: IntArray = np.zeros(objects, dtype=np.int64)
+        """First near piece of each surface; -1 for a surface beyond the reach"""
+        self.surface_bounds_m: FloatArray = np.zeros(objects)
+        """Key of each surface, the least of its pieces'"""
+        self.surface_volumes_m3: FloatArray = np.zeros(objects)
+        """Volume of each surface"""
         self.rows: IntArray = np.zeros(primitives, dtype=np.int64)
         """Rows of the present object's primitives within the reach"""
+        self.row_bounds: FloatArray = np.zeros((primitives, 4))
+        """Centre and radius around each of them"""
+        self.row_blocks: FloatArray = np.zeros((primitives // ROWS_TOGETHER + 1, 4))
+        """Centre and radius around each block of them"""
+        self.no_inflation: FloatArray = np.zeros((primitives, 1))
         self.entries: np.ndarray = np.zeros(primitives, dtype=ENTRY)
         self.samples: FloatArray = np.zeros((SAMPLES + 1, 2))
         """Kept samples of an overlap profile over the margin: V and dV/dE"""

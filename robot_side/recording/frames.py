@@ -1,11 +1,12 @@
 """Encoding and decoding of recorded frames of perceived objects.
 
-    frame   time f64, flags u8 (1: whole, 2: errors, 4: meshes), then for each array of ARRAYS: tag u8, rows u32, and
-            by the tag
+    frame   time f64, flags u8 (1: whole, 2: errors, 4: meshes, 8: surfaces), then for each array of ARRAYS: tag u8,
+            rows u32, and by the tag
               0   nothing: same as in the frame before   1   rows x width values
               2   count u32, count row numbers u32, count x width values: these rows, the others as before
               3   nothing: the array is None
             errors, if flagged: sds_m as such an array, unseen_m f64, late_s f64
+            surfaces, if flagged, as such an array
             meshes, if flagged: length u32 and MessagePack: vertices and triangles of each mesh that was sent
             names: length u32 and MessagePack, in whole frames only; roles: one u8 an object
 
@@ -33,7 +34,7 @@ ARRAYS: Final[Mapping[str, tuple[type, tuple[int, ...]]]] = {
 } | {"velocities_m_s": (np.float64, (3,))}
 """Arrays of a frame in their order, with the type of their values and the shape of a row"""
 _SAME, _WHOLE, _ROWS, _NONE = range(4)
-_IS_WHOLE, _HAS_ERRORS, _HAS_MESHES = 1, 2, 4
+_IS_WHOLE, _HAS_ERRORS, _HAS_MESHES, _HAS_SURFACES = 1, 2, 4, 8
 _FRAME: Final = struct.Struct("<dB")
 _UNSEEN: Final = struct.Struct("<dd")
 _LENGTH: Final = struct.Struct("<I")
@@ -61,12 +62,15 @@ class FramePacker:
             sources = ()
         errs = frame.sds_m is not None or frame.unseen_m > 0.0 or frame.late_s > 0.0
         flags = (last is None) * _IS_WHOLE | errs * _HAS_ERRORS | bool(sources) * _HAS_MESHES
+        flags |= (frame.surfaces is not None) * _HAS_SURFACES
         parts = [_FRAME.pack(frame.time_s, flags)]
         for name in ARRAYS:
             parts += _packed(getattr(frame, name), None if last is None else getattr(last, name))
         if errs:
             parts += _packed(frame.sds_m, None if last is None else last.sds_m)
             parts.append(_UNSEEN.pack(frame.unseen_m, frame.late_s))
+        if frame.surfaces is not None:
+            parts += _packed(frame.surfaces, None if last is None else last.surfaces)
         for content in ([sources] if sources else []) + ([frame.names] if last is None else []):
             packed = msgspec.msgpack.encode(content)
             parts += [_LENGTH.pack(len(packed)), packed]
@@ -120,6 +124,9 @@ class FrameUnpacker:
             arrays["sds_m"], position = _unpacked(content, position, np.float64, (), before)
             arrays["unseen_m"], arrays["late_s"] = _UNSEEN.unpack_from(content, position)
             position += _UNSEEN.size
+        if flags & _HAS_SURFACES:
+            before = None if last is None else last.surfaces
+            arrays["surfaces"], position = _unpacked(content, position, np.int64, (), before)
         library = None if last is None else last.mesh_library
         if flags & _HAS_MESHES:
             sources, position = _content(content, position, tuple[tuple[bytes, bytes], ...])

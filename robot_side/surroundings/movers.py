@@ -65,7 +65,7 @@ class Movers:
         """(n,) indices of the movers' primitives among all primitives of the frame"""
         self.first_rows = np.searchsorted(owners[self._own], np.append(things, len(first.names)))
         self.parts = self._all_parts(kinds[self._own], rows_of_kind[self._own])
-        made_whole = {*self.parts, "time_s", "roles", "since", "unseen_m", "late_s"}
+        made_whole = {*self.parts, "time_s", "roles", "since", "unseen_m", "late_s", "surfaces"}
         self._still = {name: value for name, value in vars(first).items() if name not in made_whole}
 
     def _all_parts(self, kinds: IntArray, rows_of_kind: IntArray) -> Mapping[str, Part]:
@@ -116,11 +116,12 @@ class Movers:
         roles: tuple[Role, ...],
         unseen_m: float = 0.0,
         late_s: float = 0.0,
+        surfaces: IntArray | None = None,
     ) -> PerceivedObjects:
         """Return a new frame: the movers have these numbers (n + m, 20), all other objects are as in the first frame.
 
-        roles: of all objects. unseen_m, late_s: as in a frame.
-        ValueError for numbers of another shape or type, or for another number of roles.
+        roles: of all objects. unseen_m, late_s: as in a frame. surfaces: of all objects; None: as in the first frame.
+        ValueError for numbers of another shape or type, or for another number of roles or of surfaces.
         """
         shape = len(self._own) + len(self.things), NUMBERS
         if numbers.shape != shape or numbers.dtype != np.float64 or not numbers.flags.c_contiguous:
@@ -130,9 +131,9 @@ class Movers:
             )
         if len(roles) != len(self.first.names):
             raise ValueError(f"roles holds {len(roles)} roles; valid: one for each of {len(self.first.names)} objects")
-        return _MoversFrame(
-            **self._still, time_s=time_s, roles=roles, since=(self, numbers), unseen_m=unseen_m, late_s=late_s
-        )
+        surfaces = self.first.surfaces if surfaces is None else surfaces
+        said = {"time_s": time_s, "roles": roles, "unseen_m": unseen_m, "late_s": late_s, "surfaces": surfaces}
+        return _MoversFrame(**self._still, **said, since=(self, numbers))
 
 
 class _MoversFrame(PerceivedObjects):

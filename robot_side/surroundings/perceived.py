@@ -76,6 +76,9 @@ class PerceivedObjects:
     sds_m: FloatArray | None = field(default_factory=lambda: None)
     """(k,) standard deviation σ_c of each object's position along each axis; NaN: that of the settings. None: for all.
     """
+    surfaces: IntArray | None = field(default_factory=lambda: None)
+    """(k,) number, 0 to k - 1, of the surface that each object is a piece of; -1: it stands alone. None: all do. The
+    law takes the obstacles of one surface for one object (docs/feel.md)."""
     unseen_m: float = 0.0
     """Distance by which each object may have moved since it was seen, in any direction"""
     late_s: float = 0.0

@@ -67,6 +67,19 @@ class SceneTable:
         self.blocks = Blocks(self.object_bounds)
         self.object_order, self.ordered_bounds = self.blocks.order, self.blocks.bounds
         self.block_bounds, self.group_bounds = self.blocks.blocks, self.blocks.groups
+        self.surfaces: IntArray = np.empty(0, dtype=np.int64)
+        """(k,) number of the surface that each object is a piece of, see `PerceivedObjects`; (0,) if all stand alone"""
+        self.follow_surfaces()
+
+    def follow_surfaces(self) -> None:
+        """Take over the surfaces of the frame in `objects`."""
+        new = self.objects.surfaces
+        if new is None or len(new) == len(self.surfaces):
+            self.surfaces[:] = -1 if new is None else new
+        else:
+            self.surfaces = new.copy()
+            # The bundle holds the array's address.
+            vars(self).pop("bundle", None)
 
     @cached_property
     def kernels(self) -> IntArray:
@@ -128,6 +141,7 @@ def go_to(table: SceneTable, objects: PerceivedObjects) -> bool:
             return False
         table.moving = moving
     table.objects = objects
+    table.follow_surfaces()
     return True
 
 

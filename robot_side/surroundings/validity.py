@@ -65,15 +65,15 @@ def require_valid(objects: PerceivedObjects) -> None:
                 f" of {len(objects.names)} objects"
             )
         require_finite("objects.velocities_m_s", velocities)
-    _require_valid_errors(objects)
+    _require_valid_errors_and_surfaces(objects)
     for name, _, check in _CHECKED:
         fault = _fault(getattr(objects, name), check)
         if fault is not None:
             raise ValueError(f"objects.{name}{fault}")
 
 
-def _require_valid_errors(objects: PerceivedObjects) -> None:
-    """Raise a ValueError unless the errors of the positions are valid; a standard deviation may be NaN."""
+def _require_valid_errors_and_surfaces(objects: PerceivedObjects) -> None:
+    """Raise a ValueError unless the errors of the positions, and the surfaces, are valid; a deviation may be NaN."""
     if (sds_m := objects.sds_m) is not None and (
         sds_m.shape != (len(objects.names),)
         or sds_m.dtype != np.float64
@@ -83,6 +83,15 @@ def _require_valid_errors(objects: PerceivedObjects) -> None:
         raise ValueError(
             f"objects.sds_m holds {_described(sds_m)}; valid: float64, 0 or more or NaN for each of"
             f" {len(objects.names)} objects"
+        )
+    count = len(objects.names)
+    if (surfaces := objects.surfaces) is not None and (
+        surfaces.shape != (count,)
+        or surfaces.dtype != np.int64
+        or (count > 0 and not -1 <= surfaces.min() <= surfaces.max() < count)
+    ):
+        raise ValueError(
+            f"objects.surfaces holds {_described(surfaces)}; valid: int64, -1 to {count - 1} for each of {count} objects"
         )
     for name, value in (("unseen_m", objects.unseen_m), ("late_s", objects.late_s)):
         if not 0.0 <= value < np.inf:

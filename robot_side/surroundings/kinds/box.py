@@ -1,7 +1,7 @@
 """Boxes {c + Q diag(half) x : |x_i| <= 1}. Numbers of a box: centre c (3), rotation Q by rows (9), half sizes (3)."""
 
 import math
-from typing import Final
+from typing import Final, NamedTuple
 
 from common.arrays import FloatArray, IntArray
 from robot_side.compiled.kernel import FLOAT64, building_block, compiled, inlined
@@ -119,65 +119,101 @@ def chord(shapes: FloatArray, row: int, start: Vector, along: Vector) -> Chord:
     return found
 
 
+class _Edge(NamedTuple):
+    """What two planes x = a and y = b, which cross at right angles, cut off the unit ball, and off each other's discs."""
+
+    inside: float
+    """Half the length of the edge within the ball"""
+    turn_a: float
+    """Half the angle of the arc with y >= b, of the circle at x = a"""
+    turn_b: float
+    part_a: float
+    """Area with y >= b, of the disc at x = a"""
+    part_b: float
+    between: float
+    """Angle between both circles where they cross"""
+    beyond: float
+    """Volume of the ball's part with x >= a and y >= b"""
+
+
 @building_block
-def _beyond_edge(a: float, b: float) -> float:
-    """Return the volume of the unit ball's part with x >= a and y >= b.
+def _edge(a: float, b: float) -> _Edge:
+    """Return the numbers of an edge; all are 0 if one plane passes the ball.
 
     V = (S - a A - b B) / 3 with the areas A, B of the flat sides. The area S of the spherical side follows from its
     boundary's curvature (Gauss and Bonnet).
     """
-    if a * a + b * b >= 1.0 and a > 0.0 and b > 0.0:
-        return 0.0
-    a, b = max(a, -1.0), max(b, -1.0)
+    if a >= 1.0 or b >= 1.0:
+        return _Edge(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     inside = math.sqrt(max(1.0 - a * a - b * b, 0.0))
-    turn_a, turn_b = math.atan2(inside, b), math.atan2(inside, a)
-    surface = 2.0 * (math.pi - a * turn_a - b * turn_b - math.atan2(inside, -a * b))
-    return max(surface - a * _segment(1.0 - a * a, b) - b * _segment(1.0 - b * b, a), 0.0) / 3.0
+    turn_a, turn_b, between = math.atan2(inside, b), math.atan2(inside, a), math.atan2(inside, -a * b)
+    part_a, part_b = (1.0 - a * a) * turn_a - b * inside, (1.0 - b * b) * turn_b - a * inside
+    surface = 2.0 * (math.pi - a * turn_a - b * turn_b - between)
+    beyond = max(surface - a * part_a - b * part_b, 0.0) / 3.0
+    beyond = 0.0 if inside == 0.0 and a > 0.0 and b > 0.0 else beyond
+    return _Edge(inside, turn_a, turn_b, part_a, part_b, between, beyond)
+
+
+@inlined
+def _cap(height: float) -> float:
+    """Return the volume of the unit ball's part with x >= height."""
+    return math.pi / 3.0 * (1.0 - height) * (1.0 - height) * (2.0 + height)
+
+
+@inlined
+def _disc(height: float) -> float:
+    """Return the area of the unit ball's disc at x = height."""
+    return math.pi * max(1.0 - height * height, 0.0)
 
 
 @building_block
-def _segment(square: float, a: float) -> float:
-    """Return the area of a disc's part with x >= a; square: of the disc's radius."""
-    height = math.sqrt(max(square - a * a, 0.0))
-    return square * math.atan2(height, a) - a * height
+def _edges(ends: tuple[float, float], others: tuple[float, float]) -> tuple[_Edge, _Edge, _Edge, _Edge]:
+    """Return the edges of each of two parallel planes with each of two others."""
+    return (
+        *(_edge(ends[0], others[0]), _edge(ends[0], others[1])),
+        *(_edge(ends[1], others[0]), _edge(ends[1], others[1])),
+    )
 
 
-@building_block
-def _beyond_lines(square: float, a: float, b: float) -> tuple[float, float]:
-    """Return the area of a disc's part with x >= a and y >= b, and its arc's angle; square: of the disc's radius.
+@inlined
+def _on_disc(square: float, b: float, c: float, part_b: float, part_c: float) -> float:
+    """Return the area with y >= b and z >= c of a disc within which these lines do not cross.
 
-    The angle is right only if the lines cross in the disc.
+    square: of the disc's radius. part_b, part_c: areas beyond either line.
     """
-    if a * a + b * b < square:
-        width, height = math.sqrt(square - b * b), math.sqrt(square - a * a)
-        turn = math.atan2(height, a) - math.atan2(b, width)
-        return 0.5 * (square * turn - a * (height - b) - b * (width - a)), turn
-    area = 0.0
-    if a < 0.0:
-        area = _segment(square, b)
-        return (area - _segment(square, -a) if b < 0.0 else area), 0.0
-    return (_segment(square, a) if b < 0.0 else area), 0.0
+    if b < 0.0:
+        return part_c - (math.pi * square - part_b if c < 0.0 else 0.0)
+    return part_b if c < 0.0 else 0.0
 
 
 @building_block
-def _beyond_corner(a: float, b: float, c: float) -> float:
-    """Return the volume of the unit ball's part with x >= a, y >= b and z >= c, as `_beyond_edge` does."""
+def _corner(a: float, b: float, c: float, ab: _Edge, bc: _Edge, ca: _Edge) -> tuple[float, float, float, float]:
+    """Return the volume of the unit ball's part with x >= a, y >= b and z >= c, and the areas of its flat sides."""
     rest = 1.0 - a * a - b * b - c * c
+    squares = 1.0 - a * a, 1.0 - b * b, 1.0 - c * c
     if rest > 0.0:
-        area_a, turn_a = _beyond_lines(1.0 - a * a, b, c)
-        area_b, turn_b = _beyond_lines(1.0 - b * b, c, a)
-        area_c, turn_c = _beyond_lines(1.0 - c * c, a, b)
-        corners = math.atan2(math.sqrt(rest + c * c), -a * b) + math.atan2(math.sqrt(rest + a * a), -b * c)
-        corners += math.atan2(math.sqrt(rest + b * b), -c * a)
-        surface = 2.0 * math.pi - corners - a * turn_a - b * turn_b - c * turn_c
-        return max(surface - a * area_a - b * area_b - c * area_c, 0.0) / 3.0
+        turn_a, turn_b = ab.turn_a + ca.turn_b - 0.5 * math.pi, bc.turn_a + ab.turn_b - 0.5 * math.pi
+        turn_c = ca.turn_a + bc.turn_b - 0.5 * math.pi
+        area_a = 0.5 * (squares[0] * turn_a - b * (ab.inside - c) - c * (ca.inside - b))
+        area_b = 0.5 * (squares[1] * turn_b - c * (bc.inside - a) - a * (ab.inside - c))
+        area_c = 0.5 * (squares[2] * turn_c - a * (ca.inside - b) - b * (bc.inside - a))
+        surface = 2.0 * math.pi - ab.between - bc.between - ca.between - a * turn_a - b * turn_b - c * turn_c
+        return max(surface - a * area_a - b * area_b - c * area_c, 0.0) / 3.0, area_a, area_b, area_c
     # The corner is outside the ball: what is beyond two faces, but for what is beyond neither the third nor its mirror.
-    beyond, sign = 0.0, 1.0
+    beyond, sign, beyond_ca, beyond_ab = 0.0, 1.0, ca.beyond, ab.beyond
     if a < 0.0:
-        beyond, sign, a = _beyond_edge(b, c), -1.0, -a
+        beyond, sign = bc.beyond, -1.0
+        beyond_ca, beyond_ab = _cap(c) - beyond_ca, _cap(b) - beyond_ab
     if b < 0.0:
-        beyond, sign, b = beyond + sign * _beyond_edge(a, c), -sign, -b
-    return beyond + sign * _beyond_edge(a, b) if c < 0.0 else beyond
+        beyond, sign = beyond + sign * beyond_ca, -sign
+        beyond_ab = (_cap(-a) if a < 0.0 else _cap(a)) - beyond_ab
+    beyond += sign * beyond_ab if c < 0.0 else 0.0
+    return (
+        max(beyond, 0.0),
+        _on_disc(squares[0], b, c, ab.part_a, ca.part_b),
+        _on_disc(squares[1], c, a, bc.part_a, ab.part_b),
+        _on_disc(squares[2], a, b, ca.part_a, bc.part_b),
+    )
 
 
 @compiled(*OVERLAP, returns=FLOAT64)
@@ -194,7 +230,8 @@ def overlap_one_box(
     """Return the overlap of a sphere with a box, by inclusion-exclusion over the sphere's parts beyond faces.
 
     The parts beyond one face are subtracted, those beyond two faces added again, those beyond three subtracted. Lengths
-    are in units of the radius. Faces 0 to 2 are the upper faces of the three axes, 3 to 5 the lower faces.
+    are in units of the radius. Faces 0 to 2 are the upper faces of the three axes, 3 to 5 the lower faces. Each edge's
+    angles serve both of its faces and all corners, as arcs take most of the time.
     """
     a, b, c = x - shapes[row, 0], y - shapes[row, 1], z - shapes[row, 2]
     axes = (
@@ -212,33 +249,35 @@ def overlap_one_box(
         *(part * (half[0] - u), part * (half[1] - v), part * (half[2] - w)),
         *(part * (half[0] + u), part * (half[1] + v), part * (half[2] + w)),
     )
-    volume, along = 4.0 / 3.0 * math.pi, (0.0, 0.0, 0.0)
-    for face in range(6):
-        if away[face] >= 1.0:
-            continue
-        height = max(away[face], -1.0)
-        square = 1.0 - height * height
-        area = math.pi * square
-        volume -= math.pi / 3.0 * (1.0 - height) * (1.0 - height) * (2.0 + height)
-        for other in range(6):
-            if other % 3 == face % 3 or away[other] >= 1.0:
+    volume, across = 4.0 / 3.0 * math.pi, (0.0, 0.0, 0.0)
+    x_ends, y_ends, z_ends = (
+        (max(away[0], -1.0), max(away[3], -1.0)),
+        (max(away[1], -1.0), max(away[4], -1.0)),
+        (max(away[2], -1.0), max(away[5], -1.0)),
+    )
+    for k in range(2):
+        for height in (x_ends[k], y_ends[k], z_ends[k]):
+            volume -= _cap(min(height, 1.0))
+        sign = 1.0 if k == 0 else -1.0
+        across = add(across, scale(sign, (_disc(x_ends[k]), _disc(y_ends[k]), _disc(z_ends[k]))))
+    xy, yz, zx = _edges(x_ends, y_ends), _edges(y_ends, z_ends), _edges(z_ends, x_ends)
+    for i in range(2):
+        for j in range(2):
+            near, far = 1.0 - 2.0 * i, 1.0 - 2.0 * j
+            one, two, three = xy[2 * i + j], yz[2 * i + j], zx[2 * i + j]
+            volume += one.beyond + two.beyond + three.beyond
+            across = subtract(across, scale(near, (one.part_a, two.part_a, three.part_a)))
+            across = subtract(across, scale(far, (three.part_b, one.part_b, two.part_b)))
+            if x_ends[i] >= 1.0 or y_ends[j] >= 1.0:
                 continue
-            area -= _segment(square, away[other])
-            if face < other:
-                volume += _beyond_edge(height, away[other])
-            for third in range(other + 1, 6):
-                if third % 3 != face % 3 and third % 3 != other % 3 and away[third] < 1.0:
-                    area += _beyond_lines(square, away[other], away[third])[0]
-                    if face < other:
-                        volume -= _beyond_corner(height, away[other], away[third])
-        rising = area if face >= 3 else -area
-        axis = face % 3
-        along = (
-            along[0] + (rising if axis == 0 else 0.0),
-            along[1] + (rising if axis == 1 else 0.0),
-            along[2] + (rising if axis == 2 else 0.0),
-        )
-    pushed = add(scale(along[0], axes[0]), add(scale(along[1], axes[1]), scale(along[2], axes[2])))
+            for k in range(2):
+                if z_ends[k] < 1.0:
+                    beyond, area_x, area_y, area_z = _corner(
+                        x_ends[i], y_ends[j], z_ends[k], one, yz[2 * j + k], zx[2 * k + i]
+                    )
+                    volume -= beyond
+                    across = add(across, (near * area_x, far * area_y, (1.0 - 2.0 * k) * area_z))
+    pushed = add(scale(-across[0], axes[0]), add(scale(-across[1], axes[1]), scale(-across[2], axes[2])))
     return to_metres(max(volume, 0.0), pushed, radius, radius, overlap_gradient)
 
 
