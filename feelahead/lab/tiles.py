@@ -9,6 +9,8 @@ from common.roles import Role
 from robot_side.surroundings.perceived import PerceivedObjects
 
 _THICK_M: Final = 0.02
+_HEAP: Final = 60
+"""Number of boxes of a round object on a table, of which a camera sees the upper half"""
 
 
 class Tiling(NamedTuple):
@@ -84,3 +86,24 @@ def tiled(
     count = len(aside_m)
     centers_m = middle_m + np.column_stack([aside_m, out_m]) @ rotation.T
     return Boxes(centers_m, np.tile(rotation, (count, 1, 1)), np.tile(half_m, (count, 1)))
+
+
+def cluttered_table(top_m: FloatArray, size_m: tuple[float, float], tiling: Tiling, count: int, seed: int = 0) -> Boxes:
+    """Return a table, its top at `top_m` (3,), and on it heaps of small tilted boxes, `count` boxes in all.
+
+    The table's tiles are four times as large as those of the heaps, as a flat surface needs fewer.
+    """
+    up, random = np.array([0.0, 0.0, 1.0]), np.random.default_rng(seed)
+    table = tiled(top_m, up, size_m, tiling._replace(tile_m=4.0 * tiling.tile_m), seed)
+    left = max(count - len(table.centers_m), 0)
+    heaps = -(-left // _HEAP)
+    middles_m = top_m + np.column_stack([random.uniform(-0.4, 0.4, (heaps, 2)) * size_m, np.zeros(heaps)])
+    outwards = random.normal(size=(left, 3))
+    outwards[:, 2] = np.abs(outwards[:, 2])
+    outwards /= np.linalg.norm(outwards, axis=1)[:, None]
+    radii_m = np.repeat(random.uniform(0.03, 0.07, heaps), _HEAP)[:left]
+    faces_m = np.repeat(middles_m, _HEAP, axis=0)[:left] + radii_m[:, None] * outwards
+    half_m = 0.5 * np.array([tiling.tile_m, tiling.tile_m, _THICK_M])
+    rotations = np.array([frame_at(outward) for outward in outwards])
+    heaped = Boxes(faces_m - 0.5 * _THICK_M * outwards, rotations, np.tile(half_m, (left, 1)))
+    return table.and_also(heaped)

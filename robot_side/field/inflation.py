@@ -12,7 +12,7 @@ from robot_side.arm.port import CLUSTER
 from robot_side.compiled.kernel import FLOAT64, building_block, inlined, tuple_type
 from robot_side.compiled.vectors import Vector, add, cross, dot, load, norm, scale, subtract
 from robot_side.enlargement.distance import statistical_distance
-from robot_side.field.scratch import SCRATCH, Error, ScratchColumns
+from robot_side.field.scratch import PART, SCRATCH, Error, ScratchColumns
 
 scratch_at = SCRATCH.at
 
@@ -125,7 +125,7 @@ def place_spheres(
 
 @building_block
 def inflate(missed: DirectionalErrors, scratch_bundle: IntArray, count: int) -> bool:
-    """Fill inflations, D_σ, errors and clusters of the scratch's first `count` spheres.
+    """Fill inflations, D_σ, errors, clusters and parts of the scratch's first `count` spheres.
 
     Return False for numbers that are not finite.
     """
@@ -145,6 +145,10 @@ def inflate(missed: DirectionalErrors, scratch_bundle: IntArray, count: int) -> 
         middle, radius = around_spheres(scratch.spheres, scratch.inflation_m, first, min(first + CLUSTER, count))
         cluster = scratch.clusters[first // CLUSTER]
         cluster[0], cluster[1], cluster[2], cluster[3] = *middle, radius
+    for first in range(0, count, PART):
+        middle, radius = around_spheres(scratch.spheres, scratch.inflation_m, first, min(first + PART, count))
+        part = scratch.parts[first // PART]
+        part[0], part[1], part[2], part[3] = *middle, radius
     return math.isfinite(check)
 
 

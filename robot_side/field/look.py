@@ -31,13 +31,15 @@ from robot_side.field.inflation import (
     most_along,
     place_spheres,
 )
-from robot_side.field.near_rows import cluster_bound, cluster_contact
+from robot_side.field.near_rows import cluster_bound, cluster_contact, next_row
 from robot_side.field.nearest_first import drop_first, push
 from robot_side.field.pairs import enter, pairs_of
 from robot_side.field.profile import follow
 from robot_side.field.samples import Profile
-from robot_side.field.scratch import MOST_WORK, SCRATCH, STRENGTHS, Bundles, Count, Error, ScratchColumns
+from robot_side.field.scratch import MOST_WORK, PART, SCRATCH, STRENGTHS, Bundles, Count, Error, ScratchColumns
 from robot_side.field.surfaces import approach_of, errors_of, keep_pieces, queue_objects
+from robot_side.surroundings.kinds.layout import MESH
+from robot_side.surroundings.scene_columns import SCENE
 
 MARGIN_M: Final = 0.012
 """Margin m: distance before the onset of full strength over which strength grows from 0"""
@@ -45,7 +47,7 @@ LEAST_DEPTH_M: Final = 0.0005
 """Depth into a sphere up to which an overlap is a graze: V_min = π R (0.5 mm)². Encoder noise diverts the motion by
 less."""
 
-scratch_at = SCRATCH.at
+scene_at, scratch_at = SCENE.at, SCRATCH.at
 
 
 @inlined
@@ -101,13 +103,20 @@ def _look_at(
     are done lie at the other end of the queue's array. volume: the object's. lead: that which all pairs of the object
     have in common.
     """
-    scratch = scratch_at(bundles.scratch)
+    scene, scratch, met = scene_at(bundles.scene), scratch_at(bundles.scratch), True
     keys, items, count, pairs, waiting, margin = scratch.keys_m, scratch.items, 0, 0, 0, MARGIN_M
     far, nearest = reach + margin + lead, math.inf
-    clusters = (spheres + CLUSTER - 1) // CLUSTER
+    clusters, last = (spheres + CLUSTER - 1) // CLUSTER, min(far, _last_to_count(scratch, margin) + lead)
     for cluster in range(clusters):
-        bound, rough = cluster_bound(bundles, rows, cluster, along, far)
-        if bound <= far:
+        if cluster % (PART // CLUSTER) == 0:
+            part = cluster * CLUSTER // PART
+            met = (
+                next_row(scene, scratch, 0, rows, load(scratch.parts, part), along, last, scratch.parts[part, 3]) < rows
+            )
+        if not met:
+            continue
+        bound, rough = cluster_bound(bundles, rows, cluster, along, last)
+        if bound <= last:
             item = -1 - cluster - (clusters if rough else 0)
             count = push(keys, items, count, _key(bound, lead, rough), item)
     while count > 0 and keys[0] < _last_to_count(scratch, margin) and _within_budget(scratch, pairs):
@@ -123,8 +132,9 @@ def _look_at(
             near = min(last, max(nearest, first + lead) + margin)
             bound = cluster_contact(bundles, rows, -1 - item - clusters, along, near, True)
             if bound <= near:
-                # An overlap may rise: now meshes are tested for overlap, too.
-                bound = cluster_contact(bundles, rows, -1 - item - clusters, along, near, False)
+                if scene.kernels[MESH] != 0:
+                    # An overlap may rise: now meshes are tested for overlap, too.
+                    bound = cluster_contact(bundles, rows, -1 - item - clusters, along, near, False)
                 nearest = min(nearest, bound)
                 count = push(keys, items, count, _key(bound, lead, False), item + clusters)
             elif near < last:
@@ -206,7 +216,7 @@ def look(
     middle, size = around_spheres(scratch.spheres, scratch.inflation_m, 0, spheres)
     differ = of_objects.size > 0
     shorter = most_along(errors) if differ else scratch.along_m[Error.ALONG]
-    count = queue_objects(bundles, classes, approach, along, middle, size, shorter, reach + margin)
+    count = queue_objects(bundles, classes, approach, along, middle, size, spheres, shorter, reach + margin)
     keys, things, inflated = scratch.bounds_m, scratch.objects, errors
     while count > 0 and keys[0] < _last_to_count(scratch, margin) and _within_budget(scratch, 0):
         thing = things[0]
@@ -215,9 +225,9 @@ def look(
         if own.unseen != inflated.unseen or own.variance != inflated.variance:
             if not inflate(own, scratch_bundle, spheres):
                 return False
-            inflated, (middle, size) = own, around_spheres(scratch.spheres, scratch.inflation_m, 0, spheres)
+            inflated = own
         lead = scratch.along_m[Error.ALONG] + approach_of(bundles, thing, classes, approach)
-        rows, volume = keep_pieces(bundles, thing, classes, middle, size, along, reach + margin + lead)
+        rows, volume = keep_pieces(bundles, thing, classes, spheres, along, reach + margin + lead)
         _look_at(bundles, spheres, rows, volume, thing, classes[thing], lead, along, half_gap, reach)
     if differ:  # The result's D_σ are those of the largest errors.
         inflate(errors, scratch_bundle, spheres)

@@ -7,7 +7,7 @@ from common.arrays import FloatArray
 from robot_side.compiled.kernel import building_block, inlined
 from robot_side.compiled.vectors import Vector, dot, load, subtract
 from robot_side.field.inflation import around_spheres
-from robot_side.field.scratch import ROWS_TOGETHER, SCRATCH, Bundles, ScratchColumns
+from robot_side.field.scratch import PART, ROWS_TOGETHER, SCRATCH, Bundles, ScratchColumns
 from robot_side.surroundings.any_kind import contact
 from robot_side.surroundings.bounds import passes
 from robot_side.surroundings.kinds.layout import HALF_SPACE, MESH
@@ -30,26 +30,28 @@ def _ahead(bounds: FloatArray, row: int, center: Vector, along: Vector, radius: 
 
 
 @building_block
-def keep_rows(
-    bundles: Bundles, thing: int, kept: int, center: Vector, size: float, along: Vector, reach: float
-) -> tuple[int, float]:
-    """Keep those rows of an object, after the `kept` first ones, whose primitives a sphere touches within `reach`.
+def keep_rows(bundles: Bundles, thing: int, kept: int, spheres: int, along: Vector, reach: float) -> tuple[int, float]:
+    """Keep those rows of an object, after the `kept` first ones, that a part of the gripper may touch within `reach`.
 
     Return the number of rows kept by then, and a lower bound of the object's contact distance. Meshes count as their
     bounding boxes, small primitives as their bounding spheres.
     """
     scene, scratch, least = scene_at(bundles.scene), scratch_at(bundles.scratch), math.inf
     for row in range(scene.first_rows[thing], scene.first_rows[thing + 1]):
-        kind = scene.kinds[row]
-        if kind == HALF_SPACE or passes(center, along, reach, scene.bounds, row, size):
+        kind, nearest = scene.kinds[row], math.inf
+        for part in range((spheres + PART - 1) // PART):
+            center, size, near = load(scratch.parts, part), scratch.parts[part, 3], min(reach, nearest)
+            if kind != HALF_SPACE and not passes(center, along, near, scene.bounds, row, size):
+                continue
             if kind != HALF_SPACE and scene.bounds[row, 3] < size:
                 # For what is small beside the gripper, the sphere around it is near enough, and costs a tenth.
                 distance = _ahead(scene.bounds, row, center, along, size)
             else:
-                distance, _ = contact(kind, scene.shapes, row, center, size, along, reach)
-            if distance <= reach:
-                scratch.rows[kept], least = row, min(least, distance)
-                kept += 1
+                distance, _ = contact(kind, scene.shapes, row, center, size, along, near)
+            nearest = min(nearest, distance)
+        if nearest <= reach:
+            scratch.rows[kept], least = row, min(least, nearest)
+            kept += 1
     return kept, least
 
 
@@ -102,17 +104,21 @@ def next_row(
 
 @building_block
 def cluster_bound(bundles: Bundles, rows: int, cluster: int, along: Vector, reach: float) -> tuple[float, bool]:
-    """Return a lower bound of `cluster_contact`, in which meshes count as their bounding boxes.
+    """Return a lower bound of `cluster_contact`, and whether it may be less than that.
 
-    Also return whether any mesh came into question.
+    Meshes count as their bounding boxes, and where there are many rows, small primitives as their bounding spheres.
     """
     scene, scratch = scene_at(bundles.scene), scratch_at(bundles.scratch)
     center, radius, least, rough = load(scratch.clusters, cluster), scratch.clusters[cluster, 3], math.inf, False
     place = next_row(scene, scratch, 0, rows, center, along, reach, radius)
     while place < rows:
         row, near = scratch.rows[place], min(reach, least)
-        found, _ = contact(scene.kinds[row], scene.shapes, row, center, radius, along, near)
-        least, rough = min(least, found), rough or scene.kinds[row] == MESH
+        if rows > _FEW and scene.bounds[row, 3] < radius:
+            found, rough = _ahead(scene.bounds, row, center, along, radius), True
+        else:
+            found, _ = contact(scene.kinds[row], scene.shapes, row, center, radius, along, near)
+            rough = rough or scene.kinds[row] == MESH
+        least = min(least, found)
         place = next_row(scene, scratch, place + 1, rows, center, along, min(reach, least), radius)
     return least, rough
 

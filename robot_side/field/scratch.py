@@ -27,6 +27,8 @@ contact plane; 0 for a mesh with dents. lead: distance by which all strengths be
 along the motion, the object's approach, and the inflation if the sphere is uninflated. touchable: 1 for an object that
 is to be touched. expected: D_σ(P) - D_σ(0.5) for such an object, else 0."""
 
+PART: Final = 6 * CLUSTER
+"""Number of gripper spheres in a part, which several clusters make up"""
 ROWS_TOGETHER: Final = 16
 """Number of kept rows in a block"""
 MOST_WORK: Final = 120_000
@@ -92,6 +94,7 @@ class ScratchColumns(NamedTuple):
     inflation_m: FloatArray
     sigma_m: FloatArray
     clusters: FloatArray
+    parts: FloatArray
     keys_m: FloatArray
     items: IntArray
     pairs: np.ndarray
@@ -115,7 +118,7 @@ class ScratchColumns(NamedTuple):
 
 SCRATCH: Final = Declared(
     ScratchColumns,
-    *(rows(4), FLAGS, rows(1), rows(1), rows(1), rows(4), NUMBERS, INDICES, records(PAIR), INDICES, NUMBERS),
+    *(rows(4), FLAGS, rows(1), rows(1), rows(1), rows(4), rows(4), NUMBERS, INDICES, records(PAIR), INDICES, NUMBERS),
     *(INDICES, INDICES, NUMBERS, NUMBERS, INDICES, rows(4), rows(4), rows(1)),
     *(records(ENTRY), rows(2), NUMBERS, rows(STRENGTHS), NUMBERS, INDICES),
 )
@@ -136,6 +139,8 @@ class Scratch:
         """D_σ of each sphere towards the present object at P: errors of camera, arm and prediction"""
         self.clusters: FloatArray = np.zeros((spheres // CLUSTER + 1, 4))
         """Bounding sphere of each cluster of inflated spheres"""
+        self.parts: FloatArray = np.full((spheres // PART + 1, 4), -np.inf)
+        """Bounding sphere of each part of the gripper, whose spheres are inflated"""
         self.keys_m: FloatArray = np.zeros(2 * spheres + len(self.clusters))
         self.items: IntArray = np.zeros(len(self.keys_m), dtype=np.int64)
         """Queue of one object's clusters and pairs, nearest first; `keys_m` has their keys"""

@@ -46,6 +46,7 @@ def queue_objects(
     along: Vector,
     middle: Vector,
     size: float,
+    spheres: int,
     shorter: float,
     reach: float,
 ) -> int:
@@ -67,7 +68,7 @@ def queue_objects(
         if classes[thing] == SKIPPED:
             continue
         lead = shorter + (approach[thing] if moves else 0.0)
-        rows, nearest = keep_rows(bundles, thing, 0, middle, size, along, reach + lead)
+        rows, nearest = keep_rows(bundles, thing, 0, spheres, along, reach + lead)
         if rows == 0:
             continue
         key, number = nearest - lead if nearest > 0.0 else -math.inf, _surface_of(scene, thing, classes)
@@ -113,7 +114,7 @@ def approach_of(bundles: Bundles, thing: int, classes: IntArray, approach: Float
 
 @building_block
 def keep_pieces(
-    bundles: Bundles, thing: int, classes: IntArray, middle: Vector, size: float, along: Vector, reach: float
+    bundles: Bundles, thing: int, classes: IntArray, spheres: int, along: Vector, reach: float
 ) -> tuple[int, float]:
     """Keep the rows within reach of a queued object, or of all pieces of a surface; return their number and the volume.
 
@@ -122,7 +123,7 @@ def keep_pieces(
     scene, scratch = scene_at(bundles.scene), scratch_at(bundles.scratch)
     number, rows, piece = _surface_of(scene, thing, classes), 0, thing
     while piece >= 0:
-        rows, _ = keep_rows(bundles, piece, rows, middle, size, along, reach)
+        rows, _ = keep_rows(bundles, piece, rows, spheres, along, reach)
         piece = scratch.next_pieces[piece] if number >= 0 else -1
     bound_rows(bundles, rows)
     return rows, scratch.surface_volumes_m3[number] if number >= 0 else scene.object_volumes[thing]

@@ -216,6 +216,35 @@ def _corner(a: float, b: float, c: float, ab: _Edge, bc: _Edge, ca: _Edge) -> tu
     )
 
 
+@building_block
+def _where_faces_meet(
+    x_ends: tuple[float, float], y_ends: tuple[float, float], z_ends: tuple[float, float]
+) -> tuple[float, Vector]:
+    """Return what edges and corners add to the volume, and to the areas of faces, upper ones less lower ones.
+
+    x_ends, y_ends, z_ends: heights of the upper and the lower face of each axis, above the ball's centre.
+    """
+    volume, across = 0.0, (0.0, 0.0, 0.0)
+    xy, yz, zx = _edges(x_ends, y_ends), _edges(y_ends, z_ends), _edges(z_ends, x_ends)
+    for i in range(2):
+        for j in range(2):
+            near, far = 1.0 - 2.0 * i, 1.0 - 2.0 * j
+            one, two, three = xy[2 * i + j], yz[2 * i + j], zx[2 * i + j]
+            volume += one.beyond + two.beyond + three.beyond
+            across = subtract(across, scale(near, (one.part_a, two.part_a, three.part_a)))
+            across = subtract(across, scale(far, (three.part_b, one.part_b, two.part_b)))
+            if x_ends[i] >= 1.0 or y_ends[j] >= 1.0:
+                continue
+            for k in range(2):
+                if z_ends[k] < 1.0:
+                    beyond, area_x, area_y, area_z = _corner(
+                        x_ends[i], y_ends[j], z_ends[k], one, yz[2 * j + k], zx[2 * k + i]
+                    )
+                    volume -= beyond
+                    across = add(across, (near * area_x, far * area_y, (1.0 - 2.0 * k) * area_z))
+    return volume, across
+
+
 @compiled(*OVERLAP, returns=FLOAT64)
 def overlap_one_box(
     shapes: FloatArray,
@@ -255,28 +284,16 @@ def overlap_one_box(
         (max(away[1], -1.0), max(away[4], -1.0)),
         (max(away[2], -1.0), max(away[5], -1.0)),
     )
+    cut = 0
     for k in range(2):
         for height in (x_ends[k], y_ends[k], z_ends[k]):
             volume -= _cap(min(height, 1.0))
+            cut += 1 if height < 1.0 else 0
         sign = 1.0 if k == 0 else -1.0
         across = add(across, scale(sign, (_disc(x_ends[k]), _disc(y_ends[k]), _disc(z_ends[k]))))
-    xy, yz, zx = _edges(x_ends, y_ends), _edges(y_ends, z_ends), _edges(z_ends, x_ends)
-    for i in range(2):
-        for j in range(2):
-            near, far = 1.0 - 2.0 * i, 1.0 - 2.0 * j
-            one, two, three = xy[2 * i + j], yz[2 * i + j], zx[2 * i + j]
-            volume += one.beyond + two.beyond + three.beyond
-            across = subtract(across, scale(near, (one.part_a, two.part_a, three.part_a)))
-            across = subtract(across, scale(far, (three.part_b, one.part_b, two.part_b)))
-            if x_ends[i] >= 1.0 or y_ends[j] >= 1.0:
-                continue
-            for k in range(2):
-                if z_ends[k] < 1.0:
-                    beyond, area_x, area_y, area_z = _corner(
-                        x_ends[i], y_ends[j], z_ends[k], one, yz[2 * j + k], zx[2 * k + i]
-                    )
-                    volume -= beyond
-                    across = add(across, (near * area_x, far * area_y, (1.0 - 2.0 * k) * area_z))
+    if cut > 1:
+        more, turned = _where_faces_meet(x_ends, y_ends, z_ends)
+        volume, across = volume + more, add(across, turned)
     pushed = add(scale(-across[0], axes[0]), add(scale(-across[1], axes[1]), scale(-across[2], axes[2])))
     return to_metres(max(volume, 0.0), pushed, radius, radius, overlap_gradient)
 
