@@ -31,7 +31,7 @@ from robot_side.field.inflation import (
     most_along,
     place_spheres,
 )
-from robot_side.field.near_rows import cluster_bound, cluster_contact, next_row
+from robot_side.field.near_rows import FEW, bound_of, cluster_contact
 from robot_side.field.nearest_first import drop_first, push
 from robot_side.field.pairs import enter, pairs_of
 from robot_side.field.profile import follow
@@ -98,27 +98,19 @@ def _look_at(
 ) -> None:
     """Shorten the onset distances by one object, best first. The object's rows within the reach have been kept.
 
-    Clusters and pairs share one queue: pair p is the item p, cluster c the item -1 - c. While only a lower bound of a
-    cluster's contact is known, the cluster is the item -1 - c - (number of clusters). Pairs that wait until all others
-    are done lie at the other end of the queue's array. volume: the object's. lead: that which all pairs of the object
-    have in common.
+    Parts, clusters and pairs share one queue: pair p is the item p, cluster c the item -1 - c. While only a lower bound
+    of a cluster's contact is known, the cluster is the item -1 - c - (number of clusters). A part is an item beyond
+    these. Pairs that wait until all others are done lie at the other end of the queue's array. volume: the object's.
+    lead: that which all pairs of the object have in common.
     """
-    scene, scratch, met = scene_at(bundles.scene), scratch_at(bundles.scratch), True
+    scene, scratch = scene_at(bundles.scene), scratch_at(bundles.scratch)
     keys, items, count, pairs, waiting, margin = scratch.keys_m, scratch.items, 0, 0, 0, MARGIN_M
     far, nearest = reach + margin + lead, math.inf
     clusters, last = (spheres + CLUSTER - 1) // CLUSTER, min(far, _last_to_count(scratch, margin) + lead)
-    for cluster in range(clusters):
-        if cluster % (PART // CLUSTER) == 0:
-            part = cluster * CLUSTER // PART
-            met = (
-                next_row(scene, scratch, 0, rows, load(scratch.parts, part), along, last, scratch.parts[part, 3]) < rows
-            )
-        if not met:
-            continue
-        bound, rough = cluster_bound(bundles, rows, cluster, along, last)
+    for part in range((spheres + PART - 1) // PART):
+        bound, _ = bound_of(bundles, rows, scratch.parts, part, along, last, True)
         if bound <= last:
-            item = -1 - cluster - (clusters if rough else 0)
-            count = push(keys, items, count, _key(bound, lead, rough), item)
+            count = push(keys, items, count, _key(bound, lead, scene.kernels[MESH] != 0), -1 - part - 2 * clusters)
     while count > 0 and keys[0] < _last_to_count(scratch, margin) and _within_budget(scratch, pairs):
         item, first = items[0], keys[0]
         count = drop_first(keys, items, count)
@@ -127,18 +119,12 @@ def _look_at(
             if _follow(bundles, item, rows, volume, along, reach, True):
                 waiting += 1
                 items[items.size - waiting] = item
+        elif item < -2 * clusters:
+            count = _queue_clusters(bundles, count, -1 - item - 2 * clusters, clusters, rows, lead, along, last)
         elif item < -clusters:
-            # Search at first only to a margin beyond the nearest cluster: most clusters are farther.
-            near = min(last, max(nearest, first + lead) + margin)
-            bound = cluster_contact(bundles, rows, -1 - item - clusters, along, near, True)
-            if bound <= near:
-                if scene.kernels[MESH] != 0:
-                    # An overlap may rise: now meshes are tested for overlap, too.
-                    bound = cluster_contact(bundles, rows, -1 - item - clusters, along, near, False)
-                nearest = min(nearest, bound)
-                count = push(keys, items, count, _key(bound, lead, False), item + clusters)
-            elif near < last:
-                count = push(keys, items, count, near - lead, item)
+            count, nearest = _queue_cluster(
+                bundles, count, item + clusters, item, rows, nearest, first, lead, along, last
+            )
         else:
             clear = first > -math.inf
             for i in range((-1 - item) * CLUSTER, min(-item * CLUSTER, spheres)):
@@ -154,11 +140,57 @@ def _look_at(
     scratch.counts[Count.PAIRS] += pairs
 
 
+@building_block
+def _queue_clusters(
+    bundles: Bundles, count: int, part: int, clusters: int, rows: int, lead: float, along: Vector, last: float
+) -> int:
+    """Queue the clusters of a part that may touch within the distance `last`; return the new count."""
+    scene, scratch, each = scene_at(bundles.scene), scratch_at(bundles.scratch), PART // CLUSTER
+    for cluster in range(part * each, min((part + 1) * each, clusters)):
+        bound, rough = bound_of(bundles, rows, scratch.clusters, cluster, along, last, rows > FEW)
+        if bound <= last:
+            item = -1 - cluster - (clusters if rough else 0)
+            key = _key(bound, lead, rough and scene.kernels[MESH] != 0)
+            count = push(scratch.keys_m, scratch.items, count, key, item)
+    return count
+
+
+@building_block
+def _queue_cluster(
+    bundles: Bundles,
+    count: int,
+    item: int,
+    again: int,
+    rows: int,
+    nearest: float,
+    first: float,
+    lead: float,
+    along: Vector,
+    last: float,
+) -> tuple[int, float]:
+    """Queue a cluster, so far known by the bound `first`, with its contact; return the new count and nearest contact.
+
+    item: the cluster's once its contact is known; again: as long as it is not.
+    """
+    scene, scratch = scene_at(bundles.scene), scratch_at(bundles.scratch)
+    # Search at first only to a margin beyond the nearest cluster: most clusters are farther.
+    near = min(last, max(nearest, first + lead) + MARGIN_M)
+    bound = cluster_contact(bundles, rows, -1 - item, along, near, True)
+    if bound <= near:
+        if scene.kernels[MESH] != 0:
+            # An overlap may rise: now meshes are tested for overlap, too.
+            bound = cluster_contact(bundles, rows, -1 - item, along, near, False)
+        return push(scratch.keys_m, scratch.items, count, _key(bound, lead, False), item), min(nearest, bound)
+    if near < last:
+        count = push(scratch.keys_m, scratch.items, count, near - lead, again)
+    return count, nearest
+
+
 @inlined
 def _key(bound: float, lead: float, rough: bool) -> float:
     """Return a cluster's key in the queue: its contact distance less the lead, or -∞ if it may overlap already.
 
-    rough: whether `bound` is only a lower bound.
+    rough: whether the bound is too rough to tell, as a mesh's.
     """
     return bound - lead if bound > 0.0 or rough else -math.inf
 
@@ -227,7 +259,7 @@ def look(
                 return False
             inflated = own
         lead = scratch.along_m[Error.ALONG] + approach_of(bundles, thing, classes, approach)
-        rows, volume = keep_pieces(bundles, thing, classes, spheres, along, reach + margin + lead)
+        rows, volume = keep_pieces(bundles, thing, classes, middle, size, along, reach + margin + lead)
         _look_at(bundles, spheres, rows, volume, thing, classes[thing], lead, along, half_gap, reach)
     if differ:  # The result's D_σ are those of the largest errors.
         inflate(errors, scratch_bundle, spheres)

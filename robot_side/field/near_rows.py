@@ -14,7 +14,7 @@ from robot_side.surroundings.kinds.layout import HALF_SPACE, MESH
 from robot_side.surroundings.scene_columns import SCENE, SceneColumns, contact_with
 
 scene_at, scratch_at = SCENE.at, SCRATCH.at
-_FEW: Final = ROWS_TOGETHER
+FEW: Final = ROWS_TOGETHER
 """Number of rows up to which blocks would cost more than they save"""
 
 
@@ -30,17 +30,16 @@ def _ahead(bounds: FloatArray, row: int, center: Vector, along: Vector, radius: 
 
 
 @building_block
-def keep_rows(bundles: Bundles, thing: int, kept: int, spheres: int, along: Vector, reach: float) -> tuple[int, float]:
-    """Keep those rows of an object, after the `kept` first ones, that a part of the gripper may touch within `reach`.
+def first_contact(bundles: Bundles, thing: int, spheres: int, along: Vector, reach: float) -> float:
+    """Return a lower bound of the distance at which any part of the gripper touches an object; ∞ beyond `reach`.
 
-    Return the number of rows kept by then, and a lower bound of the object's contact distance. Meshes count as their
-    bounding boxes, small primitives as their bounding spheres.
+    Meshes count as their bounding boxes, small primitives as their bounding spheres.
     """
     scene, scratch, least = scene_at(bundles.scene), scratch_at(bundles.scratch), math.inf
     for row in range(scene.first_rows[thing], scene.first_rows[thing + 1]):
-        kind, nearest = scene.kinds[row], math.inf
+        kind = scene.kinds[row]
         for part in range((spheres + PART - 1) // PART):
-            center, size, near = load(scratch.parts, part), scratch.parts[part, 3], min(reach, nearest)
+            center, size, near = load(scratch.parts, part), scratch.parts[part, 3], min(reach, least)
             if kind != HALF_SPACE and not passes(center, along, near, scene.bounds, row, size):
                 continue
             if kind != HALF_SPACE and scene.bounds[row, 3] < size:
@@ -48,18 +47,15 @@ def keep_rows(bundles: Bundles, thing: int, kept: int, spheres: int, along: Vect
                 distance = _ahead(scene.bounds, row, center, along, size)
             else:
                 distance, _ = contact(kind, scene.shapes, row, center, size, along, near)
-            nearest = min(nearest, distance)
-        if nearest <= reach:
-            scratch.rows[kept], least = row, min(least, nearest)
-            kept += 1
-    return kept, least
+            least = min(least, distance)
+    return least if least <= reach else math.inf
 
 
 @building_block
 def bound_rows(bundles: Bundles, rows: int) -> None:
     """Bound each block of the kept rows by a sphere, for `next_row`."""
     scene, scratch = scene_at(bundles.scene), scratch_at(bundles.scratch)
-    if rows <= _FEW:
+    if rows <= FEW:
         return
     for k in range(rows):
         for axis in range(4):
@@ -89,7 +85,7 @@ def next_row(
     """
     while place < rows:
         if (
-            rows > _FEW
+            rows > FEW
             and place % ROWS_TOGETHER == 0
             and not passes(center, along, reach, scratch.row_blocks, place // ROWS_TOGETHER, radius)
         ):
@@ -103,17 +99,22 @@ def next_row(
 
 
 @building_block
-def cluster_bound(bundles: Bundles, rows: int, cluster: int, along: Vector, reach: float) -> tuple[float, bool]:
-    """Return a lower bound of `cluster_contact`, and whether it may be less than that.
+def bound_of(
+    bundles: Bundles, rows: int, spheres: FloatArray, which: int, along: Vector, reach: float, quick: bool
+) -> tuple[float, bool]:
+    """Return a lower bound of the distance at which a cluster or part, a row of `spheres`, touches a kept primitive.
 
-    Meshes count as their bounding boxes, and where there are many rows, small primitives as their bounding spheres.
+    Return also whether the distance itself may be greater. The bound is infinite beyond `reach`. quick: whether small
+    primitives count as their bounding spheres.
+
+    Meshes count as their bounding boxes.
     """
     scene, scratch = scene_at(bundles.scene), scratch_at(bundles.scratch)
-    center, radius, least, rough = load(scratch.clusters, cluster), scratch.clusters[cluster, 3], math.inf, False
+    center, radius, least, rough = load(spheres, which), spheres[which, 3], math.inf, False
     place = next_row(scene, scratch, 0, rows, center, along, reach, radius)
     while place < rows:
         row, near = scratch.rows[place], min(reach, least)
-        if rows > _FEW and scene.bounds[row, 3] < radius:
+        if quick and scene.kinds[row] != HALF_SPACE and scene.bounds[row, 3] < radius:
             found, rough = _ahead(scene.bounds, row, center, along, radius), True
         else:
             found, _ = contact(scene.kinds[row], scene.shapes, row, center, radius, along, near)

@@ -141,9 +141,9 @@ class Scratch:
         """Bounding sphere of each cluster of inflated spheres"""
         self.parts: FloatArray = np.full((spheres // PART + 1, 4), -np.inf)
         """Bounding sphere of each part of the gripper, whose spheres are inflated"""
-        self.keys_m: FloatArray = np.zeros(2 * spheres + len(self.clusters))
+        self.keys_m: FloatArray = np.zeros(2 * spheres + len(self.clusters) + len(self.parts))
         self.items: IntArray = np.zeros(len(self.keys_m), dtype=np.int64)
-        """Queue of one object's clusters and pairs, nearest first; `keys_m` has their keys"""
+        """Queue of one object's parts, clusters and pairs, nearest first; `keys_m` has their keys"""
         self.pairs: np.ndarray = np.zeros(2 * spheres + 1, dtype=PAIR)
         """Pairs of the present object, at most two for each sphere, and one row to try"""
         self.objects: IntArray = np.zeros(objects, dtype=np.int64)

@@ -10,10 +10,12 @@ from common.arrays import FloatArray, IntArray
 from robot_side.compiled.kernel import building_block, inlined
 from robot_side.compiled.vectors import Vector
 from robot_side.field.inflation import DirectionalErrors, own_errors
-from robot_side.field.near_rows import bound_rows, keep_rows
+from robot_side.field.near_rows import bound_rows, first_contact
 from robot_side.field.nearest_first import push
 from robot_side.field.object_class import OBSTACLE, SKIPPED
 from robot_side.field.scratch import SCRATCH, Bundles, ScratchColumns
+from robot_side.surroundings.bounds import passes
+from robot_side.surroundings.kinds.layout import HALF_SPACE
 from robot_side.surroundings.scene_columns import SCENE, SceneColumns, next_object
 
 scene_at, scratch_at = SCENE.at, SCRATCH.at
@@ -68,8 +70,8 @@ def queue_objects(
         if classes[thing] == SKIPPED:
             continue
         lead = shorter + (approach[thing] if moves else 0.0)
-        rows, nearest = keep_rows(bundles, thing, 0, spheres, along, reach + lead)
-        if rows == 0:
+        nearest = first_contact(bundles, thing, spheres, along, reach + lead)
+        if nearest == math.inf:
             continue
         key, number = nearest - lead if nearest > 0.0 else -math.inf, _surface_of(scene, thing, classes)
         if number >= 0:
@@ -114,16 +116,25 @@ def approach_of(bundles: Bundles, thing: int, classes: IntArray, approach: Float
 
 @building_block
 def keep_pieces(
-    bundles: Bundles, thing: int, classes: IntArray, spheres: int, along: Vector, reach: float
+    bundles: Bundles, thing: int, classes: IntArray, middle: Vector, size: float, along: Vector, reach: float
 ) -> tuple[int, float]:
-    """Keep the rows within reach of a queued object, or of all pieces of a surface; return their number and the volume.
+    """Keep the rows that may be within reach of a queued object, or of all pieces of a surface.
 
-    The volume is that of the whole object or surface, V_J.
+    Return their number, and the volume V_J of the whole object or surface. middle, size: sphere around the gripper.
     """
     scene, scratch = scene_at(bundles.scene), scratch_at(bundles.scratch)
     number, rows, piece = _surface_of(scene, thing, classes), 0, thing
     while piece >= 0:
-        rows, _ = keep_rows(bundles, piece, rows, spheres, along, reach)
+        first, end = scene.first_rows[piece], scene.first_rows[piece + 1]
+        for row in range(first, end):
+            # The queue knows already that an object of one primitive is near.
+            if (
+                end - first == 1
+                or scene.kinds[row] == HALF_SPACE
+                or passes(middle, along, reach, scene.bounds, row, size)
+            ):
+                scratch.rows[rows] = row
+                rows += 1
         piece = scratch.next_pieces[piece] if number >= 0 else -1
     bound_rows(bundles, rows)
     return rows, scratch.surface_volumes_m3[number] if number >= 0 else scene.object_volumes[thing]

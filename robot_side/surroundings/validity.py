@@ -91,7 +91,8 @@ def _require_valid_errors_and_surfaces(objects: PerceivedObjects) -> None:
         or (count > 0 and not -1 <= surfaces.min() <= surfaces.max() < count)
     ):
         raise ValueError(
-            f"objects.surfaces holds {_described(surfaces)}; valid: int64, -1 to {count - 1} for each of {count} objects"
+            f"objects.surfaces holds {_described(surfaces)}; valid: int64, from -1 to {count - 1} for each of"
+            f" {count} objects"
         )
     for name, value in (("unseen_m", objects.unseen_m), ("late_s", objects.late_s)):
         if not 0.0 <= value < np.inf:

@@ -120,7 +120,7 @@ def chord(shapes: FloatArray, row: int, start: Vector, along: Vector) -> Chord:
 
 
 class _Edge(NamedTuple):
-    """What two planes x = a and y = b, which cross at right angles, cut off the unit ball, and off each other's discs."""
+    """What two planes x = a and y = b cut off the unit ball, and off each other's discs."""
 
     inside: float
     """Half the length of the edge within the ball"""
