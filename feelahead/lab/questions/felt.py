@@ -3,6 +3,7 @@
 feelahead bench felt
 feelahead bench felt --cover
 feelahead bench felt --shared
+feelahead bench felt --tiles
 """
 
 from collections.abc import Iterator
@@ -23,6 +24,7 @@ from feelahead.lab.reference.looks import LATE_M, compare, looks_of
 from feelahead.lab.shared import FIGURES, Shared, measure_shared, shared_cells
 from feelahead.lab.sweep import Question, Sweep
 from feelahead.lab.table import Row, Table
+from feelahead.lab.tiled import Tiled, measure_tiled, show_tiled, tiled_cells
 from feelahead.printing.figures import shown
 from robot_side.settings import RobotSettings
 
@@ -40,6 +42,8 @@ class FeltSweep(Sweep):
     """Do this instead: measure how closely spheres cover grippers, of the built-in arm and of --model."""
     shared: bool = False
     """Do this instead: compare the volume that the inflated gripper shares with a thing with voxels, in 20 poses."""
+    tiles: bool = False
+    """Do this instead: compare walls in tiles, as in a map, with the same walls whole: onset distances, clearances."""
     model: Annotated[tuple[Path, ...], tyro.conf.arg(metavar="FILE.xml...")] = ()
     """For --cover: MJCF files, each with an arm."""
     site: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None
@@ -53,8 +57,8 @@ class FeltSweep(Sweep):
             raise ValueError(f"--picture {self.picture}: errors have no figure; valid: with --cover")
         if bool(self.model) != (self.site is not None) or (self.model and not self.cover):
             raise ValueError("--model and --site are given without one another or --cover; valid: all three, or none")
-        if self.shared and self.cover:
-            raise ValueError("--shared and --cover are given; valid: one of them")
+        if self.shared + self.cover + self.tiles > 1:
+            raise ValueError("--shared, --cover or --tiles are given together; valid: one of them")
         for model in self.model:
             require_input_file("--model", model, "an MJCF file")
 
@@ -70,8 +74,8 @@ class Looked:
     """Scene whose stick deflections are used, instead of those of the run's own scene."""
 
 
-def cells(settings: FeltSweep) -> Iterator[Looked | Gripper | Shared]:
-    """Yield the cells that the flags choose: looks, grippers, or poses."""
+def cells(settings: FeltSweep) -> Iterator[Looked | Gripper | Shared | Tiled]:
+    """Yield the cells that the flags choose: looks, grippers, poses, or walls."""
     if settings.cover:
         points = min(settings.points, _QUICK_POINTS) if settings.quick else settings.points
         yield Gripper("built-in", None, None, points)
@@ -79,6 +83,8 @@ def cells(settings: FeltSweep) -> Iterator[Looked | Gripper | Shared]:
             yield Gripper(name, model, settings.site, points)
     elif settings.shared:
         yield from shared_cells(quick=settings.quick)
+    elif settings.tiles:
+        yield from tiled_cells(quick=settings.quick)
     else:
         yield Looked(DEMO, 6.0, 200) if settings.quick else Looked(DEMO, 20.0, 2000)
         for scene in ("mug",) if settings.quick else (*AHEAD, *ASIDE, *PASSED):
@@ -87,19 +93,24 @@ def cells(settings: FeltSweep) -> Iterator[Looked | Gripper | Shared]:
                 yield Looked(scene, 3.0, 40, aside)
 
 
-def run(cell: Looked | Gripper | Shared, seed: int) -> Iterator[Row]:
-    """Run one cell: yield a row of errors of a recorded run's looks, or the rows of --cover or --shared."""
+def run(cell: Looked | Gripper | Shared | Tiled, seed: int) -> Iterator[Row]:
+    """Run one cell: yield a row of errors of a recorded run's looks, or the rows of --cover, --shared or --tiles."""
     if isinstance(cell, Looked):
         recorded = record(cell.scene, cell.duration_s, seed, ASIDE.get(cell.sticks_of))
         yield dict(compare(*looks_of(recorded, cell.most)).row())
     elif isinstance(cell, Shared):
         yield from measure_shared(cell, seed)
+    elif isinstance(cell, Tiled):
+        yield from measure_tiled(cell)
     else:
         yield from measure_cover(cell, seed)
 
 
 def show(settings: FeltSweep, table: Table) -> Iterator[Shown]:
-    """Yield the table of errors, or that of --cover or --shared."""
+    """Yield the table of errors, or those of --cover, --shared or --tiles."""
+    if settings.tiles:
+        yield from show_tiled(table)
+        return
     if settings.shared:
         poses = ((f"{row['thing']}, D {row['inflated_mm']:g} mm", *map(row.get, FIGURES)) for row in table)
         yield shown("volume shared with the inflated gripper, beside voxels; Σ V_ij; a look", ("pose", *FIGURES), poses)
@@ -120,6 +131,14 @@ def goals(settings: FeltSweep, table: Table) -> Iterator[Goal]:
         allowed = [abs(row["off_mm3"]) / max(100.0, 0.01 * row["volume_mm3"]) for row in table]
         yield Goal("shared volume off, as a share of 1 % or 100 mm³, whichever is more", max(allowed), 1.0)
         return
+    if settings.tiles:
+        surfaces = Table(row for row in table.where(scene="ahead") if row["as"] == "surface")
+        yield Goal(
+            "full strength before a surface, later than before it whole, mm", max(surfaces.values("o8_most_mm")), 1.0
+        )
+        strict = [row["free_mm"] for row in table if row["camera_sd_m"] == 1e-3 and "free_mm" in row]
+        yield Goal("σ_c 1 mm: clearance without an alarm, mm", max(strict), 12.0)
+        return
     for (name,), rows in table.groups("gripper") if settings.cover else ():
         yield Goal(f"{name}: sticks out of its spheres, mm", max(rows.values("sticks_out_mm")), 0.0)
         yield Goal(f"{name}: spheres stand out, mm", max(rows.values("stands_out_mm")), _LIMIT_COVER_MM)
@@ -137,6 +156,6 @@ QUESTION = Question(
     show,
     lambda _, table, path: draw_cover(table, path),
     goals,
-    frozen=lambda settings: "" if settings.cover or settings.shared else frozen_hash(),
+    frozen=lambda settings: "" if settings.cover or settings.shared or settings.tiles else frozen_hash(),
     failed=lambda row: row.get("late", 0) + row.get("out_of_band", 0) > 0,
 )

@@ -21,7 +21,8 @@ from feelahead.lab.approaches.frozen import frozen_scene
 from feelahead.lab.goals import Goal
 from feelahead.lab.sweep import Question, Sweep
 from feelahead.lab.table import Row, Table
-from feelahead.lab.tick.concave import time_looks
+from feelahead.lab.tick.concave import time_calls, time_looks
+from feelahead.lab.tick.maps import MAPS, looks_at
 from feelahead.lab.tick.mixed import as_ratios
 from feelahead.lab.tick.timed_robot import COLUMNS, PROGRAM, STAGES
 from feelahead.printing.figures import shown
@@ -33,6 +34,7 @@ _QUICK_S: Final = 4.0
 _FIELDS: Final = ("mug", "u_mesh", "terrain_ahead")
 """Frozen scenes with concave objects ahead."""
 _MOST_FIELD_MS: Final = 0.3
+_MOST_MAP_MS: Final = 0.5
 _LOOK: Final = "look to message"
 _SENT: Final = 500
 """Number of objects that a process sends, in one frame or at 10 Hz"""
@@ -76,8 +78,16 @@ class Concave:
     seconds: float
 
 
-def cells(settings: TickSweep) -> Iterator[Case | Concave]:
-    """Yield the cells: the demo, an empty scene, each number of objects, sent objects, and the concave objects."""
+@dataclass(frozen=True)
+class Mapped:
+    """Cell that measures looks at a map of many near boxes."""
+
+    case: str
+    seconds: float
+
+
+def cells(settings: TickSweep) -> Iterator[Case | Concave | Mapped]:
+    """Yield the cells: the demo, an empty scene, numbers of objects, sent objects, concave objects, and maps."""
     seconds = _QUICK_S if settings.quick else settings.seconds
     yield Case("demo, each stage timed", seconds, stages=True)
     yield Case("demo", seconds)
@@ -89,12 +99,17 @@ def cells(settings: TickSweep) -> Iterator[Case | Concave]:
         yield Case(f"{_SENT} objects sent {sent}", seconds, objects=_SENT, sent=sent)
     for name in _FIELDS:
         yield Concave(name, seconds / 2.0)
+    for name in MAPS:
+        yield Mapped(name, seconds / 2.0)
 
 
-def run(cell: Case | Concave, seed: int) -> Iterator[Row]:
+def run(cell: Case | Concave | Mapped, seed: int) -> Iterator[Row]:
     """Run one cell; yield a row for each stage, and for each sum of stages."""
-    if isinstance(cell, Concave):
-        looks_s, mixed_s = time_looks(frozen_scene(cell.case), cell.seconds)
+    if not isinstance(cell, Case):
+        if isinstance(cell, Concave):
+            looks_s, mixed_s = time_looks(frozen_scene(cell.case), cell.seconds)
+        else:
+            looks_s, mixed_s = time_calls(list(looks_at(cell.case)), cell.seconds)
         for stage, spent_s in ((f"field of {cell.case}", looks_s), ("mixed", mixed_s)):
             yield {"stage": stage, "objects": 1, **as_ratios(spent_s, mixed_s)}
         return
@@ -170,6 +185,9 @@ def goals(_: TickSweep, table: Table) -> Iterator[Goal]:
     for name in _FIELDS:
         p50_us = figure("p50_us", stage=f"field of {name}")
         yield Goal(f"field of {name} p50, ms", None if p50_us is None else 1e-3 * p50_us, _MOST_FIELD_MS)
+    for name in MAPS:
+        p99_us = figure("p99_us", stage=f"field of {name}")
+        yield Goal(f"field of {name} p99, ms", None if p99_us is None else 1e-3 * p99_us, _MOST_MAP_MS)
 
 
 QUESTION = Question("bench tick", TickSweep, cells, run, show, goals=goals, timed=True)

@@ -3,8 +3,8 @@
     W(E) = max over 0 <= E' <= E of (V(E') - V(0))⁺,   d = sup{E >= 0 : W(E) = 0}
     s(D) = min(1, W(D + m) / max(W(d + m), m |∇V(0)|, V_min))
 
-Takes only inputs and constants from the compiled field. Passes over a sphere and an object only if their distance
-alone proves that they shorten no contact distance.
+Obstacles of one surface are one object. Takes only inputs and constants from the compiled field. Passes over a sphere
+and an object only if their distance alone proves that they shorten no contact distance.
 """
 
 from dataclasses import dataclass, replace
@@ -14,6 +14,7 @@ import numpy as np
 
 from common.arrays import BoolArray, FloatArray, IntArray
 from feelahead.lab.reference.solids import Solids
+from feelahead.lab.reference.surfaces import whole_surfaces
 from robot_side.arm.port import GripperPose
 from robot_side.field.along import Along
 from robot_side.field.look import LEAST_DEPTH_M, MARGIN_M
@@ -123,6 +124,7 @@ def defined_onsets(
     encoder_sigma_rad: FloatArray,
 ) -> Defined:
     """Compute the result that `Ahead.look` should have for the same arguments."""
+    objects, along = whole_surfaces(objects, classes, along)
     of_spheres_m = statistical_m(pose, along, encoder_sigma_rad)
     towards = len(pose.sphere_radii_m), len(classes)
     alone_m, sigma_m = (np.broadcast_to(of_m, towards) for of_m in of_spheres_m)

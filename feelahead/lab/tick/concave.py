@@ -4,7 +4,7 @@ import functools
 import itertools
 import math
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Final
 
@@ -54,10 +54,15 @@ def looks_before(model: Path, free_mm: Iterable[float]) -> Iterator[Callable[[],
 
 
 def time_looks(model: Path, seconds: float) -> tuple[FloatArray, FloatArray]:
-    """Measure looks at the object of `model` in chunks, with "mixed" in between; return processor times of both (s)."""
-    looks, mixed = itertools.cycle(list(looks_before(model, _FREE_MM))), Mixed()
+    """Measure looks at the object of `model`, with "mixed" in between; return processor times of both (s)."""
+    return time_calls(list(looks_before(model, _FREE_MM)), seconds)
+
+
+def time_calls(calls: Sequence[Callable[[], object]], seconds: float) -> tuple[FloatArray, FloatArray]:
+    """Measure calls in chunks, each in turn, with "mixed" in between; return processor times of both (s)."""
+    looks, mixed = itertools.cycle(calls), Mixed()
     looks_s, mixed_s = list[float](), list[float]()
-    for _ in _FREE_MM:
+    for _ in calls:
         next(looks)()
     end_s = time.perf_counter() + seconds
     while time.perf_counter() < end_s:
