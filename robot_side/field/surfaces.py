@@ -91,14 +91,14 @@ def errors_of(
     bundles: Bundles, thing: int, classes: IntArray, errors: DirectionalErrors, of_objects: FloatArray
 ) -> DirectionalErrors:
     """Return the errors of a queued object; of a surface, the largest of its pieces."""
-    scene, scratch = scene_at(bundles.scene), scratch_at(bundles.scratch)
-    unseen, variance = of_objects[thing, 0], of_objects[thing, 1]
-    piece = scratch.next_pieces[thing] if _surface_of(scene, thing, classes) >= 0 else -1
-    while piece >= 0:
-        unseen = max(unseen, of_objects[piece, 0])
-        # Below P = 0.5 a spread makes the enlargement smaller.
-        more = (of_objects[piece, 1] > variance) == (errors.quantile >= 0.0)
-        variance, piece = of_objects[piece, 1] if more else variance, scratch.next_pieces[piece]
+    scene = scene_at(bundles.scene)
+    unseen, variance, number = of_objects[thing, 0], of_objects[thing, 1], _surface_of(scene, thing, classes)
+    for piece in range(scene.surfaces.size if number >= 0 else 0):
+        if _surface_of(scene, piece, classes) == number:
+            unseen = max(unseen, of_objects[piece, 0])
+            # Below P = 0.5 a spread makes the enlargement smaller.
+            more = (of_objects[piece, 1] > variance) == (errors.quantile >= 0.0)
+            variance = of_objects[piece, 1] if more else variance
     return own_errors(errors, unseen, variance)
 
 
@@ -107,10 +107,11 @@ def approach_of(bundles: Bundles, thing: int, classes: IntArray, approach: Float
     """Return the distance by which a queued object approaches; of a surface, the largest of its pieces."""
     if approach.size == 0:
         return 0.0
-    scene, scratch, most = scene_at(bundles.scene), scratch_at(bundles.scratch), approach[thing]
-    piece = scratch.next_pieces[thing] if _surface_of(scene, thing, classes) >= 0 else -1
-    while piece >= 0:
-        most, piece = max(most, approach[piece]), scratch.next_pieces[piece]
+    scene, most = scene_at(bundles.scene), approach[thing]
+    number = _surface_of(scene, thing, classes)
+    for piece in range(scene.surfaces.size if number >= 0 else 0):
+        if _surface_of(scene, piece, classes) == number:
+            most = max(most, approach[piece])
     return float(most)
 
 

@@ -42,7 +42,8 @@ def _fast_m(
     seen: PerceivedObjects, pose: GripperPose, classes: IntArray | None = None, of_objects: FloatArray | None = None
 ) -> FloatArray:
     classes = np.full(len(seen.names), OBSTACLE, dtype=np.int64) if classes is None else classes
-    along = Along(X, 0.0, 1e-6, 2.3, 0.2, of_objects=of_objects)
+    variance_m2 = 1e-6 if of_objects is None else float(of_objects[:, 1].max())
+    along = Along(X, 0.0, variance_m2, 2.3, 0.2, of_objects=of_objects)
     return Ahead(np.zeros(6)).look(pose, Surroundings().see(seen), classes, along).fast_m
 
 
