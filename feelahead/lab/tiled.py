@@ -148,10 +148,10 @@ def _free_from_mm(looking: _Looking, cell: Tiled, tiling: Tiling | None, shared:
             out_m = looking.reaches_m(sign * looking.aside) + clear_m
             middle_m = looking.pose.tool_position_m + begins_m * looking.axis + sign * out_m * looking.aside
             normal = -sign * looking.aside
-            whole = tiling is None
-            walls.append(
-                flat(middle_m, normal, _BESIDE_M) if whole else tiled(middle_m, normal, _BESIDE_M, tiling, seed)
-            )
+            if tiling is None:
+                walls.append(flat(middle_m, normal, _BESIDE_M))
+            else:
+                walls.append(tiled(middle_m, normal, _BESIDE_M, tiling, seed))
         boxes = walls[0].and_also(*walls[1:])
         seen = boxes.objects()
         if shared and tiling is not None:

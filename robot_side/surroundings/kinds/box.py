@@ -220,10 +220,7 @@ def _corner(a: float, b: float, c: float, ab: _Edge, bc: _Edge, ca: _Edge) -> tu
 def _where_faces_meet(
     x_ends: tuple[float, float], y_ends: tuple[float, float], z_ends: tuple[float, float]
 ) -> tuple[float, Vector]:
-    """Return what edges and corners add to the volume, and to the areas of faces, upper ones less lower ones.
-
-    x_ends, y_ends, z_ends: heights of the upper and the lower face of each axis, above the ball's centre.
-    """
+    """Return what edges and corners add to the volume, and to the areas of faces, upper less lower ones."""
     volume, across = 0.0, (0.0, 0.0, 0.0)
     xy, yz, zx = _edges(x_ends, y_ends), _edges(y_ends, z_ends), _edges(z_ends, x_ends)
     for i in range(2):
@@ -279,11 +276,9 @@ def overlap_one_box(
         *(part * (half[0] + u), part * (half[1] + v), part * (half[2] + w)),
     )
     volume, across = 4.0 / 3.0 * math.pi, (0.0, 0.0, 0.0)
-    x_ends, y_ends, z_ends = (
-        (max(away[0], -1.0), max(away[3], -1.0)),
-        (max(away[1], -1.0), max(away[4], -1.0)),
-        (max(away[2], -1.0), max(away[5], -1.0)),
-    )
+    x_ends = max(away[0], -1.0), max(away[3], -1.0)
+    y_ends = max(away[1], -1.0), max(away[4], -1.0)
+    z_ends = max(away[2], -1.0), max(away[5], -1.0)
     cut = 0
     for k in range(2):
         for height in (x_ends[k], y_ends[k], z_ends[k]):

@@ -103,8 +103,7 @@ def test_recorded_surfaces_are_read_back() -> None:
     assert seen.surfaces is not None
     for surfaces in (seen.surfaces, np.flip(np.arange(len(seen.names)) - 1), None):
         read = unpacker.unpack(packer.pack(replace(seen, surfaces=surfaces)))
-        assert (read.surfaces is None) == (surfaces is None)
-        assert surfaces is None or (read.surfaces == surfaces).all()
+        np.testing.assert_array_equal(read.surfaces, surfaces)
 
 
 @pytest.mark.parametrize("surfaces", [np.zeros(3, dtype=np.int64), np.full(16, 16), np.full(16, -2), np.zeros(16)])
