@@ -47,7 +47,7 @@ COUNTS = st.tuples(*(st.integers(0, 5) for _ in ARRAYS))
 
 
 def test_every_array_of_a_frame_is_recorded() -> None:
-    # The core does not read `positions_m` and `rotations`, `since` repeats the arrays; errors and surfaces are recorded if there.
+    # The core does not read `positions_m` and `rotations`, `since` repeats the arrays; errors are recorded if there.
     others = {
         "sds_m",
         "surfaces",
