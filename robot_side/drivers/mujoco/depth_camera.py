@@ -86,6 +86,7 @@ class DepthCamera:
             return None
         self._renderer.enable_segmentation_rendering()
         seen = self._renderer.render()
-        geoms = np.where(seen[:, :, 1] == mujoco.mjtObj.mjOBJ_GEOM, seen[:, :, 0], -1)
+        # An enumeration would be compared pixel by pixel in Python.
+        geoms = np.where(seen[:, :, 1] == int(mujoco.mjtObj.mjOBJ_GEOM), seen[:, :, 0], -1)
         labels: LabelArray = self._labels[geoms]
         return labels
