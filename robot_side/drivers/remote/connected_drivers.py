@@ -105,5 +105,5 @@ class ConnectedDrivers:
         return {
             "arm": arm,
             "objects": None if self._objects is None else self._objects.summary(),
-            "pictures": None if self.pictures is None else self.pictures.summary(),
+            "pictures": None if self.pictures is None else self.pictures.senders.summary(),
         }

@@ -1,19 +1,14 @@
-"""Age of a frame of objects, as far as stamps bound it, and what is not known of the motion since (docs/drivers.md)."""
+"""What is known, and what is not, of objects' motion since the picture of their frame was taken (docs/drivers.md)."""
 
 import math
 from typing import Final, NamedTuple
 
-import msgspec
 import numpy as np
 
 from common.arrays import FloatArray
-from robot_side.drivers.remote.driver_clock import DriverClock
-from robot_side.drivers.remote.frame_message import ObjectFrame
 from robot_side.surroundings.movers import Movers
 from robot_side.surroundings.perceived import PerceivedObjects
 
-UNBOUNDED_S: Final = 0.5
-"""Time by which a frame may be older than it seems, where no echo bounds its age"""
 MOST_CARRIED_S: Final = 0.5
 """Longest time for which an object is carried on by its velocity"""
 MOST_GROWN_S: Final = 5.0
@@ -24,37 +19,6 @@ _STEP_M: Final = 0.0005
 """Steps in which the distance that objects may have moved unseen is rounded up"""
 _STILL_M_S: Final = 0.002
 """Speed up to which an object counts as at rest"""
-
-
-class FrameClock:
-    """Bounds of the sender's clock minus ours, from stamps of frames and of the answers that they echo."""
-
-    def __init__(self) -> None:
-        self._clock = DriverClock()
-        self._first_sent_s = math.inf
-
-    def sends(self, now_s: float) -> None:
-        """Note that an answer leaves, stamped `now_s`."""
-        self._first_sent_s = min(self._first_sent_s, now_s)
-
-    def update(self, frame: ObjectFrame, received_s: float) -> bool:
-        """Take a frame's stamps; False if they contradict earlier stamps."""
-        echo_s = None if frame.echo_s is msgspec.UNSET else frame.echo_s
-        ours = echo_s is not None and self._first_sent_s <= echo_s <= received_s
-        echoed = (echo_s, frame.held_s) if ours and echo_s is not None else None
-        return self._clock.update(frame.sent_s, received_s, echoed)
-
-    @property
-    def known(self) -> bool:
-        """Whether the age of frames is bounded"""
-        return self._clock.known
-
-    def taken_s(self, frame: ObjectFrame, received_s: float) -> tuple[float, float]:
-        """Return the earliest and the latest possible time, on our clock, at which a frame's picture was taken."""
-        least_offset_s = self._clock.drivers_s(0.0)
-        latest_s = min(frame.taken_s - least_offset_s, received_s - (frame.sent_s - frame.taken_s))
-        earliest_s = self._clock.ours_s(frame.taken_s) if self._clock.known else latest_s - UNBOUNDED_S
-        return min(earliest_s, latest_s), latest_s
 
 
 class Since(NamedTuple):

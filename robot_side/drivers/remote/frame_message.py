@@ -96,14 +96,6 @@ class ObjectFrame(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True)
     """Objects, each a `SeenObject`; decoded some at a time"""
 
 
-class Heard(Struct, frozen=True):
-    """Answer to a frame whose sender echoes answers."""
-
-    version: int
-    sent_s: float
-    """Time of sending on the robot side's clock"""
-
-
 class FrameRefusal(Struct, frozen=True, omit_defaults=True):
     """Reason why the last frame was rejected."""
 

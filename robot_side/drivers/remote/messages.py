@@ -84,6 +84,14 @@ class DriverCommand(Struct, frozen=True):
     """Time on the driver's clock at which the arm stops, unless a newer command has come"""
 
 
+class Heard(Struct, frozen=True):
+    """Answer to a message whose sender echoes answers."""
+
+    version: int
+    sent_s: float
+    """Time of sending on the robot side's clock"""
+
+
 class Refusal(Struct, frozen=True):
     """Reason why the last message of the program that receives this was rejected."""
 

@@ -11,19 +11,20 @@ import numpy as np
 from common.errors import FeelaheadError, OtherVersionError, RemoteProtocolError
 from common.roles import Role
 from robot_side.drivers.remote.arm import Wire
-from robot_side.drivers.remote.frame_age import UNBOUNDED_S, CarriedFrame, FrameClock
+from robot_side.drivers.remote.frame_age import CarriedFrame
 from robot_side.drivers.remote.frame_build import AT_ONCE, Arrays, Known, ReadObjects, read_in_steps
 from robot_side.drivers.remote.frame_message import (
     DEFINES_MESHES,
     FRAME_VERSION,
     MOST_OBJECTS,
     FrameRefusal,
-    Heard,
     ObjectFrame,
     UnknownMeshError,
     read_frame,
     read_mesh,
 )
+from robot_side.drivers.remote.messages import Heard
+from robot_side.drivers.remote.sender_clock import UNBOUNDED_S, SenderClock
 from robot_side.surroundings.perceived import PerceivedObjects
 from robot_side.surroundings.roles import role_from_name
 from robot_side.surroundings.validity import require_valid
@@ -33,8 +34,6 @@ OLD_S: Final = 0.5
 _REFUSAL_PERIOD_S: Final = 1.0
 _MOST_WAITING: Final = 16
 """Maximum number of frames that wait because they define meshes; others are overtaken by newer ones"""
-_UNANSWERED: Final = 50
-"""Number of answers without an echo after which the age of frames counts as unbounded"""
 
 Why = Literal["second", "version", "malformed", "order", "clock", "mesh"]
 _Waiting = tuple[bytes, bytes, float]
@@ -73,7 +72,7 @@ class RemoteObjects:
         self._peer: bytes | None = None
         self._sequence = -1
         self._heard_s = self._refused_s = -math.inf
-        self._clock, self._answers = FrameClock(), 0
+        self._clock = SenderClock()
         self._waiting: deque[_Waiting] = deque()
         self._steps: Iterator[None] | None = None
         self._frame: CarriedFrame | None = None
@@ -152,9 +151,9 @@ class RemoteObjects:
             self._reject("order", why, peer, received_s)
             return None
         if peer != self._peer or frame.sequence <= self._sequence:
-            self._clock, self._answers = FrameClock(), 0
+            self._clock = SenderClock()
         if not self._clock.update(frame, received_s):
-            self._clock = FrameClock()
+            self._clock = SenderClock()
             why = "the sender's clock jumped, or echo_s and held_s are not from our answers"
             self._reject("clock", why, peer, received_s)
             return None
@@ -163,11 +162,9 @@ class RemoteObjects:
 
     def _answer(self, frame: ObjectFrame, peer: bytes, now_s: float) -> None:
         """Send what the sender echoes, if it does."""
-        if frame.echo_s is not msgspec.UNSET:
-            self._answers += 1
-            self._clock.sends(now_s)
+        if self._clock.answers(frame, now_s):
             self._wire.send(peer, msgspec.msgpack.encode(Heard(FRAME_VERSION, now_s)))
-        if not self._clock.known and (frame.echo_s is msgspec.UNSET or self._answers > _UNANSWERED):
+        if self._clock.stays_unbounded(frame):
             text = f"the age of frames is not bounded, as none echoes an answer: each counts as {UNBOUNDED_S} s older"
             self._report_once("echo", f"objects: {text} (docs/drivers.md)")
 

@@ -53,14 +53,6 @@ class PictureMessage(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     intrinsics: Intrinsics | None = None
 
 
-class PictureHeard(Struct, frozen=True):
-    """Answer to a picture whose sender echoes answers."""
-
-    version: int
-    sent_s: float
-    """Time of sending on the robot side's clock"""
-
-
 _DECODER: Final = msgspec.msgpack.Decoder(PictureMessage)
 
 

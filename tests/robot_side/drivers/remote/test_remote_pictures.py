@@ -6,7 +6,9 @@ import msgpack
 import pytest
 
 from robot_side.drivers.remote.picture_message import PICTURE_LIMIT_BYTES
-from robot_side.drivers.remote.pictures import SILENT_S, UNBOUNDED_S, RemotePictures
+from robot_side.drivers.remote.pictures import RemotePictures
+from robot_side.drivers.remote.sender_clock import UNBOUNDED_S
+from robot_side.drivers.remote.senders import SILENT_S
 
 JPEG = b"\xff\xd8\xff\xe0 and more"
 AHEAD_S = -700.0
@@ -70,7 +72,7 @@ def test_the_newest_picture_of_each_view_is_there_until_it_is_taken() -> None:
     assert camera.pictures.take("first_person") is None
     camera.sends(peer=b"other", view="overview", width=16, height=16, format="rgb8", bytes=bytes(768))
     assert camera.pictures.fresh("overview")
-    assert camera.pictures.summary() == {"accepted": 3}
+    assert camera.pictures.senders.summary() == {"accepted": 3}
 
 
 def test_without_an_echo_a_picture_counts_as_half_a_second_older_and_that_is_told_once() -> None:
@@ -141,7 +143,7 @@ def test_what_cannot_be_is_refused_counted_and_told_once(fields: dict[str, Any],
     for _ in range(3):
         camera.sends(**fields)
     assert not camera.pictures.fresh("first_person")
-    assert sum(camera.pictures.rejected.values()) == 3
+    assert sum(camera.pictures.senders.rejected.values()) == 3
     assert len([note for note in camera.notes if says in note]) == 1
     assert len(camera.answers) == 1
     assert says in camera.answers[0]["refused"]
@@ -154,7 +156,7 @@ def test_what_cannot_be_decoded_is_refused_by_its_view() -> None:
     camera.sends()
     camera.pictures.take("first_person")
     camera.pictures.refuse("first_person", "the bytes are no whole JPEG", camera.now_s)
-    assert camera.pictures.summary() == {"accepted": 1, "undecodable": 1}
+    assert camera.pictures.senders.summary() == {"accepted": 1, "undecodable": 1}
     assert camera.answers == [{"version": 1, "refused": "first_person: the bytes are no whole JPEG"}]
 
 
@@ -164,9 +166,9 @@ def test_a_jump_of_the_senders_clock_costs_one_picture() -> None:
     camera.update()
     camera.sends(echo_s=camera.answers[0]["sent_s"])
     camera.sends(sent_s=5000.0, taken_s=5000.0)
-    assert camera.pictures.summary() == {"accepted": 2, "clock": 1}
+    assert camera.pictures.senders.summary() == {"accepted": 2, "clock": 1}
     camera.sends(sent_s=5000.0, taken_s=5000.0)
-    assert camera.pictures.summary() == {"accepted": 3, "clock": 1}
+    assert camera.pictures.senders.summary() == {"accepted": 3, "clock": 1}
 
 
 def test_a_silence_is_told_and_another_camera_may_take_the_place() -> None:
@@ -178,7 +180,7 @@ def test_a_silence_is_told_and_another_camera_may_take_the_place() -> None:
     assert camera.pictures.sends("first_person")
     camera.sends(peer=b"restarted", sequence=0)
     assert "those of first_person arrive again" in camera.notes[-1]
-    assert camera.pictures.summary() == {"accepted": 2}
+    assert camera.pictures.senders.summary() == {"accepted": 2}
 
 
 @pytest.mark.parametrize(
