@@ -1,0 +1,105 @@
+"""Message of a depth camera's process to the robot side (docs/drivers.md): a map in MessagePack."""
+
+import math
+from collections.abc import Mapping
+from typing import Annotated, Final
+
+import msgspec
+import numpy as np
+from msgspec import UNSET, Meta, Struct, UnsetType
+from scipy.spatial.transform import Rotation
+
+from common.arrays import FloatArray
+from common.errors import RemoteProtocolError
+from common.roles import Role
+from robot_side.depth.picture import DepthArray, DepthPicture, Pinhole
+from robot_side.drivers.remote.messages import decoded
+from robot_side.drivers.remote.picture_message import Intrinsics
+
+DEPTH_VERSION: Final = 1
+DEPTH_LIMIT_BYTES: Final = 3 * 1024 * 1024
+"""Enough for 1280 x 720 pixels with labels"""
+MOST_LABELS: Final = 255
+_UNIT: Final = 0.01
+"""Largest deviation of a quaternion's length from 1 that is accepted"""
+
+_Pixels = Annotated[int, Meta(ge=16, le=1920)]
+_Stamp = Annotated[float, Meta(ge=-1e12, le=1e12)]
+"""Time in s; beyond these limits a double no longer resolves milliseconds."""
+_Coordinate = Annotated[float, Meta(ge=-100.0, le=100.0)]
+_Label = Annotated[int, Meta(ge=1, le=MOST_LABELS)]
+_Name = Annotated[str, Meta(min_length=1, max_length=100)]
+
+
+class SentMount(Struct, frozen=True, forbid_unknown_fields=True):
+    """Pose of a camera in the frame of a link, or of the world."""
+
+    link: _Name
+    """Name of a link of the model, or world"""
+    position_m: tuple[_Coordinate, _Coordinate, _Coordinate]
+    quaternion: tuple[_Coordinate, _Coordinate, _Coordinate, _Coordinate]
+    """From the camera's frame, whose x is right, y down and z ahead in its picture; w first"""
+
+    def rotation(self) -> FloatArray:
+        """Return the rotation (3, 3) from the camera's frame to the link's."""
+        turned: FloatArray = Rotation.from_quat(self.quaternion, scalar_first=True).as_matrix()
+        return turned
+
+
+class DepthMessage(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Depth picture of one camera; its times are on the sender's clock."""
+
+    version: int
+    sequence: Annotated[int, Meta(ge=0, le=2**53)]
+    sent_s: _Stamp
+    taken_s: _Stamp
+    """Time at which the camera took the picture, no later than `sent_s`"""
+    echo_s: _Stamp | UnsetType | None = UNSET
+    """`sent_s` of the newest answer that the sender has read, None before the first; UNSET: it wants no answers"""
+    held_s: Annotated[float, Meta(ge=0.0, lt=1e6)] = 0.0
+    """Time from reading that answer to `sent_s`, in s"""
+    camera: _Name
+    width: _Pixels
+    height: _Pixels
+    depth: bytes
+    """Depth along the optical axis in units, 16 bits a pixel, little-endian, row by row; 0 where nothing is measured"""
+    depth_unit_m: Annotated[float, Meta(ge=1e-6, le=0.1)]
+    intrinsics: Intrinsics
+    labels: bytes | None = None
+    """Labels of a segmentation, a byte a pixel, row by row; 0: none"""
+    roles: Mapping[_Label, Role] = {}
+    """Roles by label"""
+    mount: SentMount | None = None
+    """Where the camera is; None: as the settings say"""
+
+    def picture(self, taken_s: float) -> DepthPicture:
+        """Return the picture, taken at `taken_s` on our clock."""
+        shape, of = (self.height, self.width), self.intrinsics
+        depth_m: DepthArray = np.frombuffer(self.depth, "<u2").astype(np.float32)
+        depth_m *= np.float32(self.depth_unit_m)
+        labels = None if self.labels is None else np.frombuffer(self.labels, np.uint8).reshape(shape)
+        pinhole = Pinhole(of.fx, of.fy, of.cx, of.cy)
+        return DepthPicture(taken_s, depth_m.reshape(shape), pinhole, labels, self.roles)
+
+
+_DECODER: Final = msgspec.msgpack.Decoder(DepthMessage)
+
+
+def read_depth(payload: bytes) -> DepthMessage:
+    """Decode a message; RemoteProtocolError names an invalid field."""
+    message = decoded(payload, _DECODER, DEPTH_VERSION)
+    if message.taken_s > message.sent_s:
+        raise RemoteProtocolError(f"taken_s = {message.taken_s}; valid: up to sent_s = {message.sent_s}")
+    pixels = message.width * message.height
+    for name, content, each in (("depth", message.depth, 2), ("labels", message.labels, 1)):
+        if content is not None and len(content) != each * pixels:
+            shape = f"{message.width} x {message.height} pixels"
+            text = f"valid: {each * pixels}, {each} for each of {shape}"
+            raise RemoteProtocolError(f"{name} has {len(content)} bytes; {text}")
+    if message.roles and message.labels is None:
+        raise RemoteProtocolError("roles is there without labels; valid: both, or none")
+    mount = message.mount
+    if mount is not None and abs(math.hypot(*mount.quaternion) - 1.0) > _UNIT:
+        text = "valid: a quaternion of length 1, w first"
+        raise RemoteProtocolError(f"mount: quaternion = {mount.quaternion}; {text}")
+    return message
