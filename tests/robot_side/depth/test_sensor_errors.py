@@ -90,13 +90,13 @@ def test_without_errors_the_depth_is_the_true_one() -> None:
     true_m = np.random.default_rng(1).uniform(0.2, 2.9, SHAPE).astype(np.float32)
     assert np.array_equal(ErrorMaker(D435, NATIVE, SHAPE, 1, level=0.0).apply(true_m), true_m)
     seen = ErrorMaker(SENSORS["ideal"], NATIVE, SHAPE, 1).apply(true_m)
-    assert seen == pytest.approx(true_m, rel=1e-6)
+    assert np.abs(seen - true_m).max() < 1e-6
 
 
 def test_disparity_comes_in_steps() -> None:
     sensor = SensorErrors(growth_per_m=D435.growth_per_m, step_per_m=D435.step_per_m)
     steps = (errors(sensor, 1.0, 1)[0] + 1.0) / D435.step_per_m
-    assert steps == pytest.approx(np.rint(steps), abs=1e-3)
+    assert np.abs(steps - np.rint(steps)).max() < 1e-3
     assert len(np.unique(np.rint(steps))) > 10
     assert sensor.depth_errors().growth_per_m > sensor.growth_per_m
 

@@ -89,7 +89,7 @@ def test_its_depth_arrives_with_its_intrinsics_and_its_age(
     newest, now_s = taken[-1]
     wall = np.full((480, 640), 0.5, dtype=np.float32)
     wall[7, 11] = 1.2345
-    assert newest.picture.depth_m == pytest.approx(wall, rel=1e-6)
+    assert np.abs(newest.picture.depth_m - wall).max() < 1e-6
     pinhole = newest.picture.pinhole
     assert (pinhole.fx, pinhole.fy, pinhole.cx, pinhole.cy) == (380.0, 381.0, 320.0, 240.75)
     assert newest.mount is None
