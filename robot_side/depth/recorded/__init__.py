@@ -1,0 +1,1 @@
+"""Recorded depth and clouds of points, as pictures of a depth camera."""
