@@ -42,10 +42,9 @@ def read_pcd(path: Path) -> Cloud:
     [form] = said["DATA"][:1] or ["nothing"]
     _require(form in ("ascii", "binary"), path, f"DATA = {form}", "ascii, binary")
     points_m = _points(path, parts, content, width * height, text=form == "ascii")
-    viewpoint = np.array(said.get("VIEWPOINT", [0, 0, 0, 1, 0, 0, 0]), dtype=np.float64)
-    _require(
-        viewpoint.shape == (7,) and bool(viewpoint[3:].any()), path, f"VIEWPOINT = {viewpoint}", "x y z qw qx qy qz"
-    )
+    viewpoint = _numbers(path, "VIEWPOINT", said.get("VIEWPOINT", ["0", "0", "0", "1", "0", "0", "0"]))
+    placed = viewpoint.shape == (7,) and bool(viewpoint[3:].any())
+    _require(placed, path, f"VIEWPOINT = {viewpoint}", "x y z qw qx qy qz")
     sensor = CameraPose(viewpoint[:3], Rotation.from_quat(viewpoint[3:], scalar_first=True).as_matrix())
     return Cloud(points_m, (height, width) if height > 1 else None, sensor)
 
@@ -80,7 +79,10 @@ def coordinates(records: "npt.NDArray[np.void]") -> FloatArray:
 
 def _split(path: Path, ends: bytes) -> tuple[list[str], bytes]:
     """Return the lines of the header, up to the one that begins with `ends`, and what follows."""
-    content = path.read_bytes()
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        raise ConfigurationError(f"{path}: {error}; valid: a file that can be read") from error
     start = content.find(b"\n" + ends, 0, _LONGEST_HEADER) + 1
     end = content.find(b"\n", start) + 1
     _require(0 < start < end, path, "the header has no end", f"a line {ends.decode().strip()}")
@@ -90,7 +92,7 @@ def _split(path: Path, ends: bytes) -> tuple[list[str], bytes]:
 def _points(path: Path, parts: Sequence[_Part], content: bytes, count: int, *, text: bool) -> FloatArray:
     """Return `count` points (n, 3) of a file whose points have these fields."""
     names = [name for name, _, _ in parts]
-    once = all(names.count(name) == 1 for name in _COORDINATES)
+    once = all([number for name, _, number in parts if name == wanted] == [1] for wanted in _COORDINATES)
     _require(once, path, f"fields = {', '.join(names)}", "x, y and z, each once")
     if not text:
         # Other fields, as padding, may share a name.
@@ -105,10 +107,14 @@ def _points(path: Path, parts: Sequence[_Part], content: bytes, count: int, *, t
     words = content.split(None, count * columns[-1])[: count * columns[-1]]
     _require(len(words) == count * columns[-1], path, f"{len(words)} numbers of points", f"{count * columns[-1]}")
     wanted = [columns[names.index(name)] for name in _COORDINATES]
+    return _numbers(path, "x, y, z", [words[column :: columns[-1]] for column in wanted]).T
+
+
+def _numbers(path: Path, name: str, words: Sequence[str] | Sequence[Sequence[bytes]]) -> FloatArray:
     try:
-        return np.array([words[column :: columns[-1]] for column in wanted], dtype=np.float64).T
+        return np.array(words, dtype=np.float64)
     except ValueError as error:
-        raise ConfigurationError(f"{path}: x, y, z: {error}; valid: numbers") from error
+        raise ConfigurationError(f"{path}: {name}: {error}; valid: numbers") from error
 
 
 def _whole(path: Path, name: str, said: Sequence[str]) -> int:

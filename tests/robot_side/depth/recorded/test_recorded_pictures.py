@@ -174,14 +174,7 @@ def test_recorded_depth_that_cannot_be_is_refused_by_its_field(
 ) -> None:
     path = tmp_path / "depth.npz"
     held: dict[str, Any] = {"depth_m": np.ones((2, 2)), "fx": 1.0, "fy": 1.0, "cx": 1.0, "cy": 1.0, "taken_s": 0.0}
-        "depth_m": np.ones((2, 2)),
-        "fx": 1.0,
-        "fy": 1.0,
-        "cx": 1.0,
-        "cy": 1.0,
-        "taken_s": 0.0,
-    } | changed
-    np.savez(path, **{name: value for name, value in held.items() if value is not None})
+    np.savez(path, **{name: value for name, value in (held | changed).items() if value is not None})
     with pytest.raises(ConfigurationError) as refused:
         only(path)
     assert str(refused.value).startswith(f"{path}: {says}")
@@ -198,6 +191,8 @@ def test_recorded_depth_that_cannot_be_is_refused_by_its_field(
         (pcd(POINTS, "binary", WIDTH="-5"), "WIDTH = -5; valid: a whole number"),
         (pcd(POINTS, "binary", DATA="binary_compressed"), "DATA = binary_compressed; valid: ascii, binary"),
         (pcd(POINTS, "binary", VIEWPOINT="0 0 0 0 0 0 0"), "VIEWPOINT = "),
+        (pcd(POINTS, "binary", VIEWPOINT="0 0 0 one 0 0 0"), "VIEWPOINT: could not convert string to float"),
+        (pcd(POINTS, "binary", COUNT="2 2 1 1 1 1"), "fields = x, pair, y, _, _, z; valid: x, y and z, each once"),
         (pcd(POINTS, "binary")[:-1], "124 bytes of points; valid: 125 or more, for 5 points"),
         (pcd(POINTS, "ascii").replace(b"0.999", b"far"), "x, y, z: could not convert string to float"),
         (pcd(POINTS, "ascii", WIDTH="6"), "50 numbers of points; valid: 60"),
@@ -235,6 +230,9 @@ def test_a_ply_that_cannot_be_read_is_refused_by_its_field(tmp_path: Path, old: 
 def test_other_files_are_refused_by_what_is_valid(tmp_path: Path) -> None:
     with pytest.raises(ConfigurationError, match=r"points\.las; valid: \.npz, \.pcd, \.ply, or the folder"):
         only(tmp_path / "points.las")
+    for name in ("missing.pcd", "missing.npz"):
+        with pytest.raises(ConfigurationError, match=rf"{name}: .*No such file"):
+            only(tmp_path / name)
     (tmp_path / "broken.npz").write_bytes(b"no archive")
     with pytest.raises(ConfigurationError, match=r"broken\.npz: .*; valid: an \.npz file"):
         only(tmp_path / "broken.npz")
