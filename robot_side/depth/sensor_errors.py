@@ -1,11 +1,11 @@
 """Pictures of true depth become those of a camera that errs: in disparity, at edges, and by holes."""
 
+import itertools
 import math
 from typing import Final
 
 import numpy as np
 import numpy.typing as npt
-from scipy.signal import lfilter
 
 from robot_side.depth.picture import DepthArray, Pinhole
 from robot_side.depth.sensors import SensorErrors
@@ -30,37 +30,35 @@ class ErrorMaker:
         self._kept = math.exp(-1.0 / length_px) if length_px > 0.0 else 0.0
         # By this share of its depth a surface at that angle falls back over three pixels.
         self._edge = 2.0 / (pinhole.fx * math.tan(_GRAZING))
-        self._constant = self._field()
+        self._constant = np.float32(level * math.sqrt(sensor.constant_share)) * self._field()
 
     def apply(self, true_depth_m: DepthArray) -> DepthArray:
         """Return what the camera measures of the true depth (h, w), 0 where there is none, in its next picture."""
         sensor, level = self._sensor, self._level
         depth_m = true_depth_m
         if level > 0.0:
-            share = sensor.constant_share
-            error = np.sqrt(np.float32(share)) * self._constant + np.sqrt(np.float32(1.0 - share)) * self._field()
+            error = self._constant + np.float32(level * math.sqrt(1.0 - sensor.constant_share)) * self._field()
             inverse = 1.0 / np.maximum(depth_m, np.float32(_NEAREST_M))
-            inverse += np.float32(level) * error * (sensor.growth_per_m + sensor.floor_m * inverse * inverse)
+            per_error = sensor.growth_per_m + (sensor.floor_m * inverse * inverse if sensor.floor_m > 0.0 else 0.0)
+            inverse += per_error * error
             if (step_per_m := level * sensor.step_per_m) > 0.0:
                 inverse = np.rint(inverse / np.float32(step_per_m)) * np.float32(step_per_m)
             # Beyond any range where the error exceeds 1/z.
             measured_m = np.where(inverse > 0.0, 1.0 / np.maximum(inverse, np.float32(1e-6)), np.float32(np.inf))
             measured_m[depth_m <= 0.0] = 0.0
             self._err_at_edges(depth_m, measured_m)
-            holes = self._generator.random(self._shape, dtype=np.float32) < level * sensor.drop_out_share
-            measured_m[holes] = 0.0
+            count = self._generator.poisson(level * sensor.drop_out_share * measured_m.size)
+            measured_m.flat[self._generator.integers(measured_m.size, size=count)] = 0.0
             depth_m = measured_m
         measures = (depth_m >= sensor.least_m) & (depth_m <= sensor.most_m)
         return np.where(measures, depth_m, np.float32(0.0))
 
     def _field(self) -> DepthArray:
         """Return a field (h, w) of standard deviation 1 and the camera's correlation."""
-        field = self._generator.standard_normal(self._shape, dtype=np.float32)
-        for axis in (0, 1) if self._kept > 0.0 else ():
-            new = np.float32(math.sqrt(1.0 - self._kept**2))
-            # The first one has no predecessor, so it is drawn whole.
-            np.moveaxis(field, axis, 0)[1:] *= new
-            field = lfilter(np.ones(1, np.float32), np.array([1.0, -self._kept], np.float32), field, axis=axis)
+        field = self._generator.standard_normal(self._shape[::-1], dtype=np.float32)
+        _correlate(field, self._kept)
+        field = np.ascontiguousarray(field.T)
+        _correlate(field, self._kept)
         return field
 
     def _err_at_edges(self, true_m: DepthArray, measured_m: DepthArray) -> None:
@@ -76,6 +74,15 @@ class ErrorMaker:
         hole |= mixed & (near_m <= 0.0)
         edge_m = np.where(mixed, near_m + mix * (far_m - near_m), measured_m[rows, columns])
         measured_m[rows, columns] = np.where(hole, np.float32(0.0), edge_m)
+
+
+def _correlate(field: DepthArray, kept: float) -> None:
+    """Let each row of independent ones keep the share `kept` of the row before, at the same standard deviation."""
+    if kept > 0.0:
+        field[1:] *= np.float32(math.sqrt(1.0 - kept * kept))
+        # Rows are long, so this loop is faster than SciPy's filter, along whose axis memory is strided.
+        for before, row in itertools.pairwise(field):
+            np.add(row, np.float32(kept) * before, out=row)
 
 
 def _neighbours(depth_m: DepthArray, choose: "np.ufunc") -> npt.NDArray[np.float32]:
