@@ -69,6 +69,10 @@ class Declared(Generic[_Columns]):
         self.at: Callable[[IntArray], _Columns] = _view(columns, forms)
         """Function that returns the named tuple of arrays for a bundle; in kernels only"""
 
+    def empty(self, count: int) -> list[np.ndarray]:
+        """Return an array of `count` rows, filled with 0, for each field."""
+        return [np.zeros((count, *form.inner), dtype=form.dtype) for form in self._forms]
+
     def bundle(self, owner: object) -> IntArray:
         """Return the bundle (n, 2): address and number of rows of each of the owner's arrays named like the fields.
 

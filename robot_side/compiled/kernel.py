@@ -64,6 +64,11 @@ def output_indices() -> Any:
     return numba.types.Array(numba.types.int64, 1, "C")
 
 
+def array_of(dtype: Any, dimensions: int, read_only: bool = False) -> Any:
+    """Return the Numba type of a C-contiguous array with elements of this NumPy type."""
+    return numba.types.Array(numba.from_dtype(np.dtype(dtype)), dimensions, "C", readonly=read_only)
+
+
 def record_array(dtype: np.dtype) -> Any:
     """Return the Numba type of a contiguous array (n,) of records, which the kernel reads and fills."""
     return numba.types.Array(numba.from_dtype(dtype), 1, "C")

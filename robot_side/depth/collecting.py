@@ -1,0 +1,121 @@
+"""Points of a picture, summed by cell. A point beside a known surface belongs to it, so that noise makes no layers."""
+
+from typing import Final
+
+import numpy as np
+
+from common.arrays import FloatArray, IntArray
+from robot_side.compiled.columns import BUNDLE
+from robot_side.compiled.kernel import array_of, compiled, input_array, input_indices, output_indices
+from robot_side.compiled.vectors import add, dot, load, norm, scale, subtract
+from robot_side.depth.grid import cell_at, indices_of
+from robot_side.depth.picture import DepthArray, LabelArray
+from robot_side.depth.surfel_columns import Count, surfels_at
+from robot_side.depth.view import DIRECTIONS, MASK, PICTURE, ray_at, sd_at, to_world, turned_to_world
+
+_SIGMAS: Final = 3.0
+_WITHOUT_NORMAL: Final = 0.1
+"""Weight of the direction to the camera where a pixel has no normal"""
+_NO_ROLE: Final = -1
+SLOTS: Final = array_of(np.int32, 1)
+"""Numba type of the surfels' rows by cell (c,); -1: no surfel"""
+
+
+@compiled(
+    *(PICTURE, MASK, MASK, input_indices(), DIRECTIONS, input_array(1)),
+    *(input_array(1), input_indices(), SLOTS, BUNDLE, output_indices()),
+)
+def collect(
+    depth_m: DepthArray,
+    own: LabelArray,
+    labels: LabelArray,
+    roles: IntArray,
+    normals: DepthArray,
+    view: FloatArray,
+    place: FloatArray,
+    cells: IntArray,
+    slot: np.ndarray,
+    bundle: IntArray,
+    counts: IntArray,
+) -> None:
+    """Add the picture's points to the sums of surfels, new ones where there are none."""
+    surfels = surfels_at(bundle)
+    height, width = depth_m.shape
+    edge = place[3]
+    counts[Count.TOUCHED] = 0
+    counts[Count.PICTURE] += 1
+    for i in range(height):
+        for j in range(width):
+            z = 1.0 * depth_m[i, j]
+            if z <= 0.0 or own[i, j]:
+                continue
+            x, y = ray_at(view, i, j)
+            point = to_world(view, (x * z, y * z, z))
+            cell = cell_at(place, cells, point)
+            if cell < 0:
+                continue
+            row = slot[cell]
+            if row < 0:
+                # Along the ray, at half a cell and a cell to either side, there may be the surface that it belongs to.
+                near, ray = _SIGMAS * sd_at(view, z), turned_to_world(view, (x, y, 1.0))
+                for step in (0.5, -0.5, 1.0, -1.0):
+                    if row < 0 and abs(step) * edge <= near + 0.5 * edge:
+                        other = cell_at(place, cells, add(point, scale(step * edge, ray)))
+                        beside = slot[other] if other >= 0 else -1
+                        if beside >= 0 and surfels.weights[beside] > 0.0:
+                            normal = load(surfels.normals, beside)
+                            away = subtract(point, load(surfels.points_m, beside))
+                            if abs(dot(away, normal)) <= near * norm(normal) and norm(away) <= 1.2 * edge:
+                                row = beside
+            if row < 0:
+                if counts[Count.FREE] > 0:
+                    counts[Count.FREE] -= 1
+                    row = surfels.free[counts[Count.FREE]]
+                elif counts[Count.TOP] < surfels.cells.size:
+                    row = counts[Count.TOP]
+                    counts[Count.TOP] += 1
+                else:
+                    counts[Count.FULL] += 1
+                    continue
+                slot[cell] = row
+                surfels.cells[row] = cell
+                surfels.weights[row] = 0.0
+                surfels.evidence[row] = surfels.astray[row] = surfels.shown[row] = surfels.seen[row] = 0
+                surfels.roles[row] = _NO_ROLE
+                counts[Count.MADE] += 1
+            sums = surfels.sums
+            if surfels.seen[row] != counts[Count.PICTURE]:
+                surfels.seen[row] = counts[Count.PICTURE]
+                surfels.touched[counts[Count.TOUCHED]] = row
+                counts[Count.TOUCHED] += 1
+                for k in range(13):
+                    sums[row, k] = 0.0
+                sums[row, 13] = z
+                surfels.votes[row] = 0
+            a, b, c = indices_of(cells, surfels.cells[row])
+            u = point[0] - (place[0] + (a + 0.5) * edge)
+            v = point[1] - (place[1] + (b + 0.5) * edge)
+            w = point[2] - (place[2] + (c + 0.5) * edge)
+            sums[row, 0] += 1.0
+            sums[row, 1] += u
+            sums[row, 2] += v
+            sums[row, 3] += w
+            sums[row, 4] += u * u
+            sums[row, 5] += v * v
+            sums[row, 6] += w * w
+            sums[row, 7] += u * v
+            sums[row, 8] += u * w
+            sums[row, 9] += v * w
+            p, q, r = 1.0 * normals[i, j, 0], 1.0 * normals[i, j, 1], 1.0 * normals[i, j, 2]
+            if p == 0.0 and q == 0.0 and r == 0.0:
+                by = -_WITHOUT_NORMAL / norm((x, y, 1.0))
+                p, q, r = by * x, by * y, by
+            sums[row, 10] += p
+            sums[row, 11] += q
+            sums[row, 12] += r
+            sums[row, 13] = min(sums[row, 13], z)
+            if labels.size > 1:
+                role = roles[labels[i, j]]
+                if surfels.votes[row] == 0:
+                    surfels.candidates[row] = role
+                surfels.votes[row] += 1 if surfels.candidates[row] == role else -1

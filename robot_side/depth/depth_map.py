@@ -1,0 +1,83 @@
+"""The map: pictures of depth cameras in, boxes behind the surfaces out."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from robot_side.depth.boxes import Boxes
+from robot_side.depth.free_space import SeenSpace
+from robot_side.depth.grid import Grid
+from robot_side.depth.own_body import own_pixels
+from robot_side.depth.picture import CameraPose, DepthErrors, DepthPicture, OwnBody
+from robot_side.depth.planes import Planes
+from robot_side.depth.settings import MapSettings
+from robot_side.depth.support import normals, supported
+from robot_side.depth.surfels import SurfelMap
+from robot_side.depth.view import view_of
+
+
+@dataclass(frozen=True)
+class Integrated:
+    """What one picture did."""
+
+    made: int
+    """Cells with points for the first time"""
+    contradicted: int
+    """Surfels that are gone, as something is measured behind them"""
+    unanswered: int
+    """Surfels that are gone, as they were in view without an answer for too long"""
+    without_room: int
+    """Pixels for which the map had no room"""
+    own_pixels: int
+    """Pixels of the robot's own, and those beside them"""
+    holes: int
+    """Pixels in which nothing was measured within range"""
+    without_support: int
+    """Pixels with which too few neighbours agree"""
+    boxes: int
+    """Boxes that there are now"""
+    changed: int
+    """Boxes that are new, gone, or elsewhere"""
+
+
+class DepthMap:
+    """Surfaces in a fixed region, which all cameras share."""
+
+    def __init__(self, settings: MapSettings) -> None:
+        self.settings = settings
+        grid = Grid.of(settings)
+        self.surfels = SurfelMap(grid)
+        self.planes = Planes(grid)
+        self.seen = SeenSpace(settings)
+
+    def integrate(
+        self, picture: DepthPicture, pose: CameraPose, body: OwnBody, errors: DepthErrors, camera: int = 0
+    ) -> Integrated:
+        """Add a picture. pose: of the camera when it was taken; body: the robot's own solids at that time.
+
+        camera: which of the cameras took it.
+        """
+        view = view_of(picture.pinhole, pose, errors)
+        measured = np.ascontiguousarray(picture.depth_m)
+        depth_m = supported(measured, view)
+        own = own_pixels(depth_m, view, body, self.settings.padding_m)
+        merged = self.surfels.integrate(picture, depth_m, normals(depth_m, view), own, view, camera)
+        self.seen.see(depth_m, view)
+        changed = self.planes.follow(self.surfels)
+        valid = (measured >= errors.least_m) & (measured <= errors.most_m)
+        answers, supports = int(np.count_nonzero(valid)), int(np.count_nonzero(depth_m))
+        return Integrated(
+            made=merged.made,
+            contradicted=merged.contradicted,
+            unanswered=merged.unanswered,
+            without_room=merged.without_room,
+            own_pixels=int(np.count_nonzero(own)),
+            holes=depth_m.size - answers,
+            without_support=answers - supports,
+            boxes=self.planes.count,
+            changed=changed,
+        )
+
+    def boxes(self) -> Boxes:
+        """Return the boxes behind all surfaces that have been in two pictures."""
+        return self.planes.boxes()

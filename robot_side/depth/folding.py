@@ -1,0 +1,70 @@
+"""New surfels that are only the noise of another one, before or behind it, do not come to be."""
+
+from typing import Final
+
+import numpy as np
+
+from common.arrays import FloatArray, IntArray
+from robot_side.compiled.columns import BUNDLE
+from robot_side.compiled.kernel import building_block, compiled, input_array, input_indices, output_indices
+from robot_side.compiled.vectors import Vector, add, dot, norm, scale, subtract, unit
+from robot_side.depth.collecting import SLOTS
+from robot_side.depth.grid import cell_at, indices_of
+from robot_side.depth.surfel_columns import Count, SurfelColumns, surfels_at
+from robot_side.depth.view import camera_position, sd_at, turned_to_world
+
+_SIGMAS: Final = 3.0
+
+
+@building_block
+def mean_point(surfels: SurfelColumns, place: FloatArray, cells: IntArray, row: int) -> Vector:
+    """Return the mean of the newest picture's points on a surfel."""
+    a, b, c = indices_of(cells, surfels.cells[row])
+    count, edge = surfels.sums[row, 0], place[3]
+    return (
+        place[0] + (a + 0.5) * edge + surfels.sums[row, 1] / count,
+        place[1] + (b + 0.5) * edge + surfels.sums[row, 2] / count,
+        place[2] + (c + 0.5) * edge + surfels.sums[row, 3] / count,
+    )
+
+
+@building_block
+def mean_normal(surfels: SurfelColumns, view: FloatArray, row: int) -> Vector:
+    """Return the mean of the newest picture's normals on a surfel, in the world frame."""
+    sums, by = surfels.sums, 1.0 / surfels.sums[row, 0]
+    return turned_to_world(view, (by * sums[row, 10], by * sums[row, 11], by * sums[row, 12]))
+
+
+@compiled(input_array(1), input_array(1), input_indices(), SLOTS, BUNDLE, output_indices())
+def fold_layers(
+    view: FloatArray, place: FloatArray, cells: IntArray, slot: np.ndarray, bundle: IntArray, counts: IntArray
+) -> None:
+    """Drop each new surfel beside one with more pixels, along the ray, whose plane it is in but for its errors."""
+    surfels, edge, kept = surfels_at(bundle), place[3], 0
+    for t in range(counts[Count.TOUCHED]):
+        row = surfels.touched[t]
+        fold = False
+        if surfels.weights[row] == 0.0:
+            point = mean_point(surfels, place, cells, row)
+            ray = unit(subtract(point, camera_position(view)))
+            near = _SIGMAS * sd_at(view, surfels.sums[row, 13])
+            for step in (0.5, -0.5, 1.0, -1.0):
+                cell = cell_at(place, cells, add(point, scale(step * edge, ray)))
+                other = slot[cell] if cell >= 0 else -1
+                if other < 0 or other == row or surfels.seen[other] != counts[Count.PICTURE]:
+                    continue
+                if surfels.sums[other, 0] <= surfels.sums[row, 0]:
+                    continue
+                away = subtract(point, mean_point(surfels, place, cells, other))
+                normal = mean_normal(surfels, view, other)
+                fold = fold or (abs(dot(away, normal)) <= near * norm(normal) and norm(away) <= edge)
+        if fold:
+            slot[surfels.cells[row]] = -1
+            surfels.cells[row] = -1
+            surfels.free[counts[Count.FREE]] = row
+            counts[Count.FREE] += 1
+            counts[Count.MADE] -= 1
+        else:
+            surfels.touched[kept] = row
+            kept += 1
+    counts[Count.TOUCHED] = kept

@@ -1,0 +1,103 @@
+"""Each picture's sums become part of the surfels' means, and of what speaks for them."""
+
+from typing import Final
+
+import numpy as np
+
+from common.arrays import FloatArray, IntArray
+from robot_side.compiled.columns import BUNDLE
+from robot_side.compiled.kernel import BOOL, array_of, compiled, input_array, input_indices, output_indices
+from robot_side.compiled.vectors import dot, load, norm, subtract, unit
+from robot_side.depth.folding import mean_normal, mean_point
+from robot_side.depth.grid import block_of
+from robot_side.depth.surfel_columns import Count, surfels_at
+from robot_side.depth.view import sd_at
+
+_SIGMAS: Final = 3.0
+MOST_WEIGHT: Final = 8.0
+"""Number of pictures that a mean is worth at most, so that it follows what changes"""
+APPEARS: Final = 2
+"""Pictures after which a surfel is shown"""
+MOST_EVIDENCE: Final = 3
+"""Pictures against it after which a surfel is gone, at most"""
+_ASTRAY: Final = 3
+"""Successive pictures that put a surfel elsewhere after which it is there"""
+_MOVED_M: Final = 0.0003
+"""Motion of a surfel, beyond half the standard deviation of a pixel, that makes its surface be looked at again"""
+DIRTY: Final = array_of(np.uint8, 1)
+"""Numba type of the blocks' marks (b,): 1 where surfaces are to be looked for again"""
+
+
+@compiled(
+    *(input_array(1), BOOL, input_array(1), input_indices(), BUNDLE, output_indices(), DIRTY),
+)
+def merge(
+    view: FloatArray,
+    labelled: bool,
+    place: FloatArray,
+    cells: IntArray,
+    bundle: IntArray,
+    counts: IntArray,
+    dirty: np.ndarray,
+) -> None:
+    """Merge the sums of the newest picture into its surfels."""
+    surfels, edge = surfels_at(bundle), place[3]
+    for t in range(counts[Count.TOUCHED]):
+        row = surfels.touched[t]
+        sums = surfels.sums
+        count = sums[row, 0]
+        u, v, w = sums[row, 1] / count, sums[row, 2] / count, sums[row, 3] / count
+        point, normal = mean_point(surfels, place, cells, row), mean_normal(surfels, view, row)
+        sd, pixel = sd_at(view, sums[row, 13]), sums[row, 13] / view[0]
+        noise = sd * sd + pixel * pixel / 12.0
+        weight, new, astray = surfels.weights[row], 1.0, False
+        if weight > 0.0:
+            # A picture counts by its variance, against that of the best.
+            best = surfels.sds_m[row]
+            if sd < best:
+                weight *= (sd / best) ** 2
+            elif sd > 0.0:
+                new = (best / sd) ** 2
+            away = dot(subtract(point, load(surfels.points_m, row)), unit(normal))
+            # Pixels' errors are alike, so that their mean errs by about as much as each.
+            astray = abs(away) > _SIGMAS * (sd + best) + 0.001
+        surfels.astray[row] = surfels.astray[row] + 1 if astray else 0
+        if weight == 0.0 or surfels.astray[row] >= _ASTRAY:
+            weight, new, surfels.sds_m[row], surfels.astray[row] = 0.0, 1.0, sd, 0
+        share = new / (weight + new)
+        surfels.weights[row] = min(weight + new, MOST_WEIGHT)
+        surfels.sds_m[row] = min(surfels.sds_m[row], sd)
+        surfels.noise_m2[row] += (
+            share * (noise - surfels.noise_m2[row]) if weight > 0.0 else noise - surfels.noise_m2[row]
+        )
+        for k in range(3):
+            surfels.points_m[row, k] += share * (point[k] - surfels.points_m[row, k])
+            surfels.normals[row, k] += share * (normal[k] - surfels.normals[row, k])
+        small = pixel * pixel / 12.0
+        spread = (
+            sums[row, 4] / count - u * u + small,
+            sums[row, 5] / count - v * v + small,
+            sums[row, 6] / count - w * w + small,
+            sums[row, 7] / count - u * v,
+            sums[row, 8] / count - u * w,
+            sums[row, 9] / count - v * w,
+        )
+        for k in range(6):
+            surfels.spreads_m2[row, k] += share * (spread[k] - surfels.spreads_m2[row, k])
+        surfels.evidence[row] = min(surfels.evidence[row] + 1, MOST_EVIDENCE)
+        surfels.unanswered_s[row] = 0.0
+        changed = False
+        if labelled and surfels.roles[row] != surfels.candidates[row]:
+            surfels.roles[row] = surfels.candidates[row]
+            changed = True
+        if not surfels.shown[row] and surfels.evidence[row] >= APPEARS:
+            surfels.shown[row] = 1
+            changed = True
+        elif surfels.shown[row]:
+            away_from = subtract(load(surfels.points_m, row), load(surfels.looked_m, row))
+            along = abs(dot(away_from, unit(load(surfels.normals, row))))
+            changed = changed or along > _MOVED_M + 0.5 * surfels.sds_m[row] or norm(away_from) > 0.3 * edge
+            # Once its mean has settled, the surface is looked at for good.
+            changed = changed or (weight < MOST_WEIGHT and surfels.weights[row] == MOST_WEIGHT)
+        if changed and surfels.shown[row]:
+            dirty[block_of(cells, surfels.cells[row])] = 1

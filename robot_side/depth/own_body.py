@@ -1,0 +1,128 @@
+"""Pixels that show the robot itself, or what it holds."""
+
+import math
+from typing import Final
+
+import numpy as np
+
+from common.arrays import FloatArray, IntArray
+from robot_side.compiled.kernel import FLOAT64, array_of, building_block, compiled, input_array, input_indices
+from robot_side.compiled.vectors import Vector, load, norm, subtract
+from robot_side.depth.picture import DepthArray, LabelArray, OwnBody
+from robot_side.depth.view import MASK, PICTURE, pixel_of, ray_at, to_camera, to_world
+
+_GROWN: Final = 2
+"""Pixels by which the robot's picture is grown: edges of objects smear"""
+_CAPSULE: Final = 3
+_ELLIPSOID: Final = 4
+_CYLINDER: Final = 5
+_BOX: Final = 6
+
+
+def own_pixels(depth_m: DepthArray, view: FloatArray, body: OwnBody, padding_m: float) -> LabelArray:
+    """Return a mask (h, w): 1 where a pixel shows a point within `padding_m` of the body, or is 2 pixels from such."""
+    own, grown = np.zeros(depth_m.shape, dtype=np.uint8), np.zeros(depth_m.shape, dtype=np.uint8)
+    _mark(
+        depth_m,
+        view,
+        body.kinds,
+        np.ascontiguousarray(body.positions_m),
+        np.ascontiguousarray(body.rotations),
+        np.ascontiguousarray(body.sizes_m),
+        padding_m,
+        own,
+    )
+    _grow(own, grown)
+    return grown
+
+
+@building_block
+def _beyond(kind: int, size: Vector, point: Vector) -> float:
+    """Return the distance of a point from a solid in the solid's own frame; of ellipsoids at most as much."""
+    x, y, z = abs(point[0]), abs(point[1]), abs(point[2])
+    if kind == _BOX:
+        return norm((max(x - size[0], 0.0), max(y - size[1], 0.0), max(z - size[2], 0.0)))
+    if kind == _CAPSULE:
+        return norm((x, y, max(z - size[1], 0.0))) - size[0]
+    if kind == _CYLINDER:
+        return norm((max(math.sqrt(x * x + y * y) - size[0], 0.0), max(z - size[1], 0.0), 0.0))
+    if kind == _ELLIPSOID:
+        # Along the way to the centre the surface is further than across it by at most the ratio of the axes.
+        length = norm((x / size[0], y / size[1], z / size[2]))
+        return (length - 1.0) * min(size[0], min(size[1], size[2]))
+    return norm((x, y, z)) - size[0]
+
+
+@building_block
+def _radius(kind: int, size: Vector) -> float:
+    """Return the radius of the sphere around a solid."""
+    if kind == _BOX:
+        return norm(size)
+    if kind == _CAPSULE:
+        return size[0] + size[1]
+    if kind == _CYLINDER:
+        return math.sqrt(size[0] * size[0] + size[1] * size[1])
+    if kind == _ELLIPSOID:
+        return max(size[0], max(size[1], size[2]))
+    return size[0]
+
+
+@compiled(
+    *(PICTURE, input_array(1), input_indices(), input_array(2), input_array(3), input_array(2), FLOAT64),
+    array_of(np.uint8, 2),
+)
+def _mark(
+    depth_m: DepthArray,
+    view: FloatArray,
+    kinds: IntArray,
+    positions_m: FloatArray,
+    rotations: FloatArray,
+    sizes_m: FloatArray,
+    padding_m: float,
+    own: LabelArray,
+) -> None:
+    height, width = depth_m.shape
+    for k in range(kinds.size):
+        size, center = load(sizes_m, k), load(positions_m, k)
+        reach = _radius(kinds[k], size) + padding_m
+        x, y, z = to_camera(view, center)
+        if z + reach <= 0.0:
+            continue
+        top, left, bottom, right = 0, 0, height - 1, width - 1
+        if z - reach > 1e-3:
+            # Corners of a square around the sphere, at its nearest and its furthest depth.
+            near, far = z - reach, z + reach
+            a, b = pixel_of(
+                view, (min((x - reach) / near, (x - reach) / far), min((y - reach) / near, (y - reach) / far), 1.0)
+            )
+            c, d = pixel_of(
+                view, (max((x + reach) / near, (x + reach) / far), max((y + reach) / near, (y + reach) / far), 1.0)
+            )
+            top, left, bottom, right = max(a, 0), max(b, 0), min(c, bottom), min(d, right)
+        for i in range(top, bottom + 1):
+            for j in range(left, right + 1):
+                depth = depth_m[i, j]
+                if depth <= 0.0 or own[i, j] or abs(depth - z) > reach:
+                    continue
+                across, down = ray_at(view, i, j)
+                u, v, w = subtract(to_world(view, (across * depth, down * depth, 1.0 * depth)), center)
+                if u * u + v * v + w * w > reach * reach:
+                    continue
+                point = (
+                    rotations[k, 0, 0] * u + rotations[k, 1, 0] * v + rotations[k, 2, 0] * w,
+                    rotations[k, 0, 1] * u + rotations[k, 1, 1] * v + rotations[k, 2, 1] * w,
+                    rotations[k, 0, 2] * u + rotations[k, 1, 2] * v + rotations[k, 2, 2] * w,
+                )
+                if _beyond(kinds[k], size, point) <= padding_m:
+                    own[i, j] = 1
+
+
+@compiled(MASK, array_of(np.uint8, 2))
+def _grow(own: LabelArray, grown: LabelArray) -> None:
+    height, width = own.shape
+    for i in range(height):
+        for j in range(width):
+            if own[i, j]:
+                for row in range(max(0, i - _GROWN), min(height, i + _GROWN + 1)):
+                    for column in range(max(0, j - _GROWN), min(width, j + _GROWN + 1)):
+                        grown[row, column] = 1
