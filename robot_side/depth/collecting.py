@@ -91,6 +91,7 @@ def collect(
                 for k in range(13):
                     sums[row, k] = 0.0
                 sums[row, 13] = z
+                sums[row, 14] = counts[Count.PICTURE]
                 surfels.votes[row] = 0
             a, b, c = indices_of(cells, surfels.cells[row])
             u = point[0] - (place[0] + (a + 0.5) * edge)

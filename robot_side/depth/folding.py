@@ -11,9 +11,14 @@ from robot_side.compiled.vectors import Vector, add, dot, norm, scale, subtract,
 from robot_side.depth.collecting import SLOTS
 from robot_side.depth.grid import cell_at, indices_of
 from robot_side.depth.surfel_columns import Count, SurfelColumns, surfels_at
-from robot_side.depth.view import camera_position, sd_at, turned_to_world
+from robot_side.depth.view import camera_position, pixels_across, sd_at, turned_to_world
 
 _SIGMAS: Final = 3.0
+_FEW: Final = 0.15
+"""Share of the pixels that a cell seen from ahead has, below which noise may explain them"""
+_SIGMAS_IF_FEW: Final = 5.0
+_SHARE_IF_FEW: Final = 0.4
+"""Share of the other surfel's pixels that they then have at most"""
 
 
 @building_block
@@ -35,36 +40,51 @@ def mean_normal(surfels: SurfelColumns, view: FloatArray, row: int) -> Vector:
     return turned_to_world(view, (by * sums[row, 10], by * sums[row, 11], by * sums[row, 12]))
 
 
+@building_block
+def _is_noise(
+    surfels: SurfelColumns, view: FloatArray, place: FloatArray, cells: IntArray, slot: np.ndarray, row: int
+) -> bool:
+    """Return whether a surfel's points are but the noise of another one's, before or behind it."""
+    edge, count, depth = place[3], surfels.sums[row, 0], surfels.sums[row, 13]
+    few = count < _FEW * pixels_across(view, edge, depth) ** 2
+    if not few and surfels.weights[row] > 0.0:
+        return False
+    sigmas, most = (_SIGMAS_IF_FEW, _SHARE_IF_FEW) if few else (_SIGMAS, 1.0)
+    point, near = mean_point(surfels, place, cells, row), sigmas * sd_at(view, depth)
+    ray = unit(subtract(point, camera_position(view)))
+    for step in (0.5, -0.5, 1.0, -1.0):
+        cell = cell_at(place, cells, add(point, scale(step * edge, ray)))
+        other = slot[cell] if cell >= 0 else -1
+        if other < 0 or other == row or surfels.sums[other, 14] != surfels.sums[row, 14]:
+            continue
+        if count < most * surfels.sums[other, 0]:
+            away = subtract(point, mean_point(surfels, place, cells, other))
+            normal = mean_normal(surfels, view, other)
+            if abs(dot(away, normal)) <= near * norm(normal) and norm(away) <= edge + near:
+                return True
+    return False
+
+
 @compiled(input_array(1), input_array(1), input_indices(), SLOTS, BUNDLE, output_indices())
 def fold_layers(
     view: FloatArray, place: FloatArray, cells: IntArray, slot: np.ndarray, bundle: IntArray, counts: IntArray
 ) -> None:
-    """Drop each new surfel beside one with more pixels, along the ray, whose plane it is in but for its errors."""
-    surfels, edge, kept = surfels_at(bundle), place[3], 0
+    """Leave out each surfel beside one with more pixels, along the ray, whose plane it is in but for its errors.
+
+    That is for new surfels, which do not come to be, and for those with few pixels, as if they had none.
+    """
+    surfels, kept = surfels_at(bundle), 0
     for t in range(counts[Count.TOUCHED]):
         row = surfels.touched[t]
-        fold = False
+        if not _is_noise(surfels, view, place, cells, slot, row):
+            surfels.touched[kept] = row
+            kept += 1
+            continue
+        surfels.seen[row] = 0
         if surfels.weights[row] == 0.0:
-            point = mean_point(surfels, place, cells, row)
-            ray = unit(subtract(point, camera_position(view)))
-            near = _SIGMAS * sd_at(view, surfels.sums[row, 13])
-            for step in (0.5, -0.5, 1.0, -1.0):
-                cell = cell_at(place, cells, add(point, scale(step * edge, ray)))
-                other = slot[cell] if cell >= 0 else -1
-                if other < 0 or other == row or surfels.seen[other] != counts[Count.PICTURE]:
-                    continue
-                if surfels.sums[other, 0] <= surfels.sums[row, 0]:
-                    continue
-                away = subtract(point, mean_point(surfels, place, cells, other))
-                normal = mean_normal(surfels, view, other)
-                fold = fold or (abs(dot(away, normal)) <= near * norm(normal) and norm(away) <= edge)
-        if fold:
             slot[surfels.cells[row]] = -1
             surfels.cells[row] = -1
             surfels.free[counts[Count.FREE]] = row
             counts[Count.FREE] += 1
             counts[Count.MADE] -= 1
-        else:
-            surfels.touched[kept] = row
-            kept += 1
     counts[Count.TOUCHED] = kept

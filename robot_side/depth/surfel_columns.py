@@ -6,9 +6,9 @@ from typing import Final, NamedTuple
 from common.arrays import FloatArray, IntArray
 from robot_side.compiled.columns import INDICES, NUMBERS, Declared, rows
 
-SUMS: Final = 14
+SUMS: Final = 15
 """Sums of a picture's pixels on one surfel: count, offsets from the cell's middle (3), their products (6), normals (3),
-and the least depth"""
+the least depth, and the picture's number"""
 
 
 class SurfelColumns(NamedTuple):
@@ -43,7 +43,7 @@ class SurfelColumns(NamedTuple):
     shown: IntArray
     """(n,) 1 from its second picture on"""
     sums: FloatArray
-    """(n, 14) see `SUMS`"""
+    """(n, 15) see `SUMS`"""
     votes: IntArray
     """(n,) majority vote on the role of one picture's pixels: lead of the candidate"""
     candidates: IntArray

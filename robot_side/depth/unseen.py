@@ -17,13 +17,15 @@ from robot_side.depth.grid import block_of
 from robot_side.depth.merging import DIRTY
 from robot_side.depth.picture import DepthArray, LabelArray
 from robot_side.depth.surfel_columns import Count, surfels_at
-from robot_side.depth.view import LEAST, MASK, MOST, PICTURE, pixel_of, sd_at, to_camera
+from robot_side.depth.view import LEAST, MASK, MOST, PICTURE, pixel_of, pixels_across, sd_at, to_camera
 
 _SIGMAS: Final = 3.0
 _UNANSWERED_S: Final = 1.9
 """Time in view without an answer after which a surfel is gone: with the next picture, within 2 s"""
 _MOST_HOLES: Final = 4
 """Pixels without depth, of nine, with which a place still has an answer"""
+_FINE: Final = 2.0
+"""Pixels across a cell from which on each surfel in view should have some"""
 _NEAR: Final = 1.1
 """Factor on the least range within which a surface may already be too near"""
 
@@ -78,12 +80,15 @@ def look_for_unseen(
             surfels.unanswered_s[row] += elapsed_s
             gone = surfels.unanswered_s[row] > _UNANSWERED_S
             counts[Count.UNANSWERED] += gone
-        else:
-            surfels.unanswered_s[row] = 0.0
-            if least - _SIGMAS * sd_at(view, least) > a[2] + 0.5 * edge:
-                surfels.evidence[row] -= 1
-                gone = surfels.evidence[row] <= 0
-                counts[Count.CONTRADICTED] += gone
+        elif least - _SIGMAS * sd_at(view, least) > a[2] + 0.5 * edge:
+            surfels.evidence[row] -= 1
+            gone = surfels.evidence[row] <= 0
+            counts[Count.CONTRADICTED] += gone
+        elif least > a[2] - sd - 0.5 * edge and pixels_across(view, edge, a[2]) >= _FINE:
+            # Something is measured about there, but at other surfels, and so often that it is noise.
+            surfels.unanswered_s[row] += elapsed_s
+            gone = surfels.unanswered_s[row] > _UNANSWERED_S
+            counts[Count.CONTRADICTED] += gone
         if gone:
             if surfels.shown[row]:
                 dirty[block_of(cells, surfels.cells[row])] = 1

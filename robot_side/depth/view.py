@@ -87,3 +87,9 @@ def pixel_of(view: FloatArray, a: Vector) -> tuple[int, int]:
 def camera_position(view: FloatArray) -> Vector:
     """Return where the camera is, in the world frame."""
     return view[_POSITION], view[_POSITION + 1], view[_POSITION + 2]
+
+
+@inlined
+def pixels_across(view: FloatArray, length_m: float, depth_m: float) -> float:
+    """Return how many pixels a length square to the view has at a depth."""
+    return view[0] * length_m / depth_m
