@@ -16,6 +16,8 @@ from robot_side.depth.view import DIRECTIONS, MASK, PICTURE, ray_at, sd_at, to_w
 _SIGMAS: Final = 3.0
 _WITHOUT_NORMAL: Final = 0.1
 """Weight of the direction to the camera where a pixel has no normal"""
+_FURTHEST: Final = 3
+"""Cells along a ray that are searched at most"""
 _NO_ROLE: Final = -1
 SLOTS: Final = array_of(np.int32, 1)
 """Numba type of the surfels' rows by cell (c,); -1: no surfel"""
@@ -56,17 +58,18 @@ def collect(
                 continue
             row = slot[cell]
             if row < 0:
-                # Along the ray, at half a cell and a cell to either side, there may be the surface that it belongs to.
+                # Along the ray, at halves of a cell to either side, there may be the surface that it belongs to.
                 near, ray = _SIGMAS * sd_at(view, z), turned_to_world(view, (x, y, 1.0))
-                for step in (0.5, -0.5, 1.0, -1.0):
-                    if row < 0 and abs(step) * edge <= near + 0.5 * edge:
-                        other = cell_at(place, cells, add(point, scale(step * edge, ray)))
-                        beside = slot[other] if other >= 0 else -1
-                        if beside >= 0 and surfels.weights[beside] > 0.0:
-                            normal = load(surfels.normals, beside)
-                            away = subtract(point, load(surfels.points_m, beside))
-                            if abs(dot(away, normal)) <= near * norm(normal) and norm(away) <= 1.2 * edge:
-                                row = beside
+                for half in range(2, 2 * min(int(near / edge + 0.5), _FURTHEST) + 4):
+                    step = (0.25 if half % 2 else -0.25) * (half // 2 * 2)
+                    other = cell_at(place, cells, add(point, scale(step * edge, ray)))
+                    beside = slot[other] if other >= 0 else -1
+                    if beside >= 0 and surfels.weights[beside] > 0.0:
+                        normal = load(surfels.normals, beside)
+                        away = subtract(point, load(surfels.points_m, beside))
+                        if abs(dot(away, normal)) <= near * norm(normal) and norm(away) <= near + 1.2 * edge:
+                            row = beside
+                            break
             if row < 0:
                 if counts[Count.FREE] > 0:
                     counts[Count.FREE] -= 1

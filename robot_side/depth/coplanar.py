@@ -14,6 +14,8 @@ _IN_LINE: Final = 0.998
 _BESIDE: Final = 0.5
 """Cells by which the edges of two rectangles side by side may differ, and the gap between them may measure"""
 _FLAT_M: Final = 0.001
+_FEWER: Final = 0.5
+"""Share of a patch's surfels that another one has at most that may be its noise"""
 
 
 @inlined
@@ -35,6 +37,37 @@ def merge_coplanar(patches: PatchColumns, count: int, edge: float) -> None:
                 patches.nodes[second] = -1
                 second = -1
             second += 1
+
+
+@building_block
+def absorb(patches: PatchColumns, count: int, edge: float) -> None:
+    """Mark patches (of the first `count`) that lie in a larger one's box, or before it by no more than noise."""
+    for small in range(count):
+        for large in range(count):
+            if small == large or patches.nodes[small] < 0 or patches.nodes[large] < 0:
+                continue
+            if patches.counts[small] <= _FEWER * patches.counts[large] and _lies_in(patches, small, large, edge):
+                patches.nodes[small] = -1
+
+
+@building_block
+def _lies_in(patches: PatchColumns, small: int, large: int, edge: float) -> bool:
+    if patches.roles[small] != patches.roles[large]:
+        return False
+    between = subtract(load(patches.means_m, small), load(patches.means_m, large))
+    between = add(between, scale(patches.rises_m[small], normal_of(patches, small)))
+    u, v, normal = axis_of(patches, large, 0), axis_of(patches, large, 1), normal_of(patches, large)
+    aside = 0.25 * edge
+    for corner in range(4):
+        away = add(between, _corner(patches, small, corner))
+        a, b, c = dot(away, u), dot(away, v), dot(away, normal)
+        if a < patches.lows_m[large, 0] - aside or a > patches.highs_m[large, 0] + aside:
+            return False
+        if b < patches.lows_m[large, 1] - aside or b > patches.highs_m[large, 1] + aside:
+            return False
+        if c < -2.0 * edge or c > _FLAT_M + patches.rises_m[large] + patches.sds_m[large]:
+            return False
+    return True
 
 
 @building_block

@@ -6,12 +6,20 @@ import numpy as np
 
 from common.arrays import FloatArray, IntArray
 from robot_side.compiled.columns import BUNDLE
-from robot_side.compiled.kernel import BOOL, array_of, compiled, input_array, input_indices, output_indices
-from robot_side.compiled.vectors import dot, load, norm, subtract, unit
+from robot_side.compiled.kernel import (
+    BOOL,
+    array_of,
+    building_block,
+    compiled,
+    input_array,
+    input_indices,
+    output_indices,
+)
+from robot_side.compiled.vectors import Vector, dot, load, norm, scale, subtract, unit
 from robot_side.depth.folding import mean_normal, mean_point
 from robot_side.depth.grid import block_of
-from robot_side.depth.surfel_columns import Count, surfels_at
-from robot_side.depth.view import sd_at
+from robot_side.depth.surfel_columns import Count, SurfelColumns, surfels_at
+from robot_side.depth.view import camera_position, sd_at
 
 _SIGMAS: Final = 3.0
 MOST_WEIGHT: Final = 8.0
@@ -22,10 +30,30 @@ MOST_EVIDENCE: Final = 3
 """Pictures against it after which a surfel is gone, at most"""
 _ASTRAY: Final = 3
 """Successive pictures that put a surfel elsewhere after which it is there"""
+_NOISE: Final = 0.6
+"""Share of a pixel's variance that shows within a surface, as neighbours' errors are alike"""
+_GRAZING: Final = 0.04
+"""Least square of the cosine between a ray and a normal that counts"""
 _MOVED_M: Final = 0.0003
 """Motion of a surfel, beyond half the standard deviation of a pixel, that makes its surface be looked at again"""
 DIRTY: Final = array_of(np.uint8, 1)
 """Numba type of the blocks' marks (b,): 1 where surfaces are to be looked for again"""
+
+
+@building_block
+def _average_spread(
+    surfels: SurfelColumns, row: int, share: float, small_m2: float, ray: Vector, facing: Vector
+) -> None:
+    """Add the covariance of the newest picture's points to the mean; small_m2: variance within a pixel."""
+    slant = dot(ray, facing)
+    # A pixel is a small rectangle on the surface, longer the more the view grazes it.
+    across, longer = subtract(ray, scale(slant, facing)), small_m2 / max(slant * slant, _GRAZING)
+    sums, by, place = surfels.sums, 1.0 / surfels.sums[row, 0], 0
+    for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)):
+        pixel = (small_m2 if i == j else 0.0) - small_m2 * facing[i] * facing[j] + longer * across[i] * across[j]
+        spread = by * sums[row, 4 + place] - by * by * sums[row, 1 + i] * sums[row, 1 + j] + pixel
+        surfels.spreads_m2[row, place] += share * (spread - surfels.spreads_m2[row, place])
+        place += 1
 
 
 @compiled(
@@ -49,7 +77,7 @@ def merge(
         u, v, w = sums[row, 1] / count, sums[row, 2] / count, sums[row, 3] / count
         point, normal = mean_point(surfels, place, cells, row), mean_normal(surfels, view, row)
         sd, pixel = sd_at(view, sums[row, 13]), sums[row, 13] / view[0]
-        noise = sd * sd + pixel * pixel / 12.0
+        noise = _NOISE * sd * sd
         weight, new, astray = surfels.weights[row], 1.0, False
         if weight > 0.0:
             # A picture counts by its variance, against that of the best.
@@ -73,17 +101,8 @@ def merge(
         for k in range(3):
             surfels.points_m[row, k] += share * (point[k] - surfels.points_m[row, k])
             surfels.normals[row, k] += share * (normal[k] - surfels.normals[row, k])
-        small = pixel * pixel / 12.0
-        spread = (
-            sums[row, 4] / count - u * u + small,
-            sums[row, 5] / count - v * v + small,
-            sums[row, 6] / count - w * w + small,
-            sums[row, 7] / count - u * v,
-            sums[row, 8] / count - u * w,
-            sums[row, 9] / count - v * w,
-        )
-        for k in range(6):
-            surfels.spreads_m2[row, k] += share * (spread[k] - surfels.spreads_m2[row, k])
+        facing, ray = unit(normal), unit(subtract(point, camera_position(view)))
+        _average_spread(surfels, row, share, pixel * pixel / 12.0, ray, facing)
         surfels.evidence[row] = min(surfels.evidence[row] + 1, MOST_EVIDENCE)
         surfels.unanswered_s[row] = 0.0
         changed = False

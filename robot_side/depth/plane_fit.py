@@ -15,6 +15,8 @@ from robot_side.depth.surfel_columns import SurfelColumns
 
 _ROOT3: Final = math.sqrt(3.0)
 """Half a uniform distribution's width, in its standard deviations"""
+_REACH: Final = 1.25 * _ROOT3
+"""Half of what a surfel fills, in its standard deviations: pixels may be further apart than cells"""
 _LINE: Final = 0.4
 """Standard deviation across a patch, in cells, below which its own points do not tell its normal"""
 _AGREEING: Final = 0.7
@@ -186,7 +188,7 @@ def lay_rectangle(
 def is_filled(
     surfels: SurfelColumns, members: IntArray, start: int, end: int, patches: PatchColumns, patch: int, edge: float
 ) -> bool:
-    """Return whether surfels fill their patch's rectangle, but for a fiftieth of its cells."""
+    """Return whether surfels fill their patch's rectangle, but for a thirtieth of its cells."""
     raster, mean = _new_raster(), load(patches.means_m, patch)
     u = patches.axes[patch, 0], patches.axes[patch, 1], patches.axes[patch, 2]
     v = patches.axes[patch, 3], patches.axes[patch, 4], patches.axes[patch, 5]
@@ -202,8 +204,8 @@ def is_filled(
         row = members[place]
         away = subtract(load(surfels.points_m, row), mean)
         a, b = dot(away, u) - left, dot(away, v) - low
-        p = _ROOT3 * math.sqrt(max(along(surfels.spreads_m2, row, u), 0.0)) + 0.25 * edge
-        q = _ROOT3 * math.sqrt(max(along(surfels.spreads_m2, row, v), 0.0)) + 0.25 * edge
+        p = _REACH * math.sqrt(max(along(surfels.spreads_m2, row, u), 0.0)) + 0.25 * edge
+        q = _REACH * math.sqrt(max(along(surfels.spreads_m2, row, v), 0.0)) + 0.25 * edge
         # A cell of the raster is filled if its middle is.
         first, last = math.ceil((a - p) * across / width - 0.5), math.floor((a + p) * across / width - 0.5)
         lowest, top = math.ceil((b - q) * up / height - 0.5), math.floor((b + q) * up / height - 0.5)
@@ -211,4 +213,4 @@ def is_filled(
             for j in range(max(lowest, 0), min(top, up - 1) + 1):
                 empty -= raster[i, j] == 0
                 raster[i, j] = 1
-    return empty * 50 <= across * up
+    return empty * 30 <= across * up

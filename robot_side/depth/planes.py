@@ -9,7 +9,7 @@ from robot_side.compiled.columns import BUNDLE
 from robot_side.compiled.kernel import INT64, compiled, input_array, input_indices, output_indices
 from robot_side.depth.boxes import Boxes
 from robot_side.depth.collecting import SLOTS
-from robot_side.depth.coplanar import merge_coplanar
+from robot_side.depth.coplanar import absorb, merge_coplanar
 from robot_side.depth.grid import LEVELS, Grid
 from robot_side.depth.keeping import keep_or_write
 from robot_side.depth.merging import DIRTY
@@ -127,6 +127,7 @@ def _look_again(
     if count > 0:
         found = divide(surfels, cells, members, spare, count, patches, place[3], was_patch, block * NODES)
         merge_coplanar(patches, found, place[3])
+        absorb(patches, found, place[3])
     row = first_box[block]
     while row >= 0:
         boxes.found[row] = 0

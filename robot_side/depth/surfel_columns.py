@@ -23,7 +23,7 @@ class SurfelColumns(NamedTuple):
     looked_m: FloatArray
     """(n, 3) its point when surfaces were last looked for"""
     noise_m2: FloatArray
-    """(n,) variance that noise and the size of pixels add along any direction"""
+    """(n,) variance that noise adds along a view"""
     weights: FloatArray
     """(n,) number of pictures of today's errors that its mean is worth"""
     sds_m: FloatArray
