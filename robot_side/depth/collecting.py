@@ -16,7 +16,7 @@ from robot_side.depth.view import DIRECTIONS, MASK, PICTURE, ray_at, sd_at, to_w
 _SIGMAS: Final = 3.0
 _WITHOUT_NORMAL: Final = 0.1
 """Weight of the direction to the camera where a pixel has no normal"""
-_FURTHEST: Final = 3
+FURTHEST: Final = 3
 """Cells along a ray that are searched at most"""
 _NO_ROLE: Final = -1
 SLOTS: Final = array_of(np.int32, 1)
@@ -60,14 +60,16 @@ def collect(
             if row < 0:
                 # Along the ray, at halves of a cell to either side, there may be the surface that it belongs to.
                 near, ray = _SIGMAS * sd_at(view, z), turned_to_world(view, (x, y, 1.0))
-                for half in range(2, 2 * min(int(near / edge + 0.5), _FURTHEST) + 4):
+                for half in range(2, 2 * min(int(near / edge + 0.5), FURTHEST) + 4):
                     step = (0.25 if half % 2 else -0.25) * (half // 2 * 2)
                     other = cell_at(place, cells, add(point, scale(step * edge, ray)))
                     beside = slot[other] if other >= 0 else -1
                     if beside >= 0 and surfels.weights[beside] > 0.0:
                         normal = load(surfels.normals, beside)
                         away = subtract(point, load(surfels.points_m, beside))
-                        if abs(dot(away, normal)) <= near * norm(normal) and norm(away) <= near + 1.2 * edge:
+                        # The error is along the ray, so that a grazed surface shows less of it.
+                        off = near * min(abs(dot(ray, normal)) + 0.2, norm(normal))
+                        if abs(dot(away, normal)) <= off and norm(away) <= near + 1.2 * edge:
                             row = beside
                             break
             if row < 0:

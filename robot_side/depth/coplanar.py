@@ -3,8 +3,11 @@
 import math
 from typing import Final
 
+import numpy as np
+
 from robot_side.compiled.kernel import building_block, inlined
 from robot_side.compiled.vectors import Vector, add, dot, load, scale, subtract
+from robot_side.depth.partition import LENIENCE
 from robot_side.depth.patch_columns import PatchColumns
 from robot_side.depth.plane_fit import along, choose_normal, measure_rise, normal_of
 
@@ -25,14 +28,19 @@ def axis_of(patches: PatchColumns, patch: int, k: int) -> Vector:
 
 
 @building_block
-def merge_coplanar(patches: PatchColumns, count: int, edge: float) -> None:
-    """Merge patches (of the first `count`) as long as two together are a rectangle in a plane; mark those that went."""
+def merge_coplanar(patches: PatchColumns, count: int, edge: float, into: np.ndarray, nodes: int) -> None:
+    """Merge patches (of the first `count`) as long as two together are a rectangle in a plane; mark those that went.
+
+    into: node with which each was together before; the block's begin at `nodes`.
+    """
     # Rows from `count` on are free: the next one holds what two patches would be together.
     for first in range(count):
         second = 0
         while second < count:
             apart = first == second or patches.nodes[first] < 0 or patches.nodes[second] < 0
-            if not apart and _try(patches, first, second, count, edge):
+            if not apart and _try(patches, first, second, count, edge, _lenience(patches, first, second, into, nodes)):
+                into[nodes + patches.nodes[second]] = patches.nodes[first]
+                into[nodes + patches.nodes[first]] = patches.nodes[second]
                 patches.nodes[first] = min(patches.nodes[first], patches.nodes[second])
                 patches.nodes[second] = -1
                 second = -1
@@ -40,24 +48,34 @@ def merge_coplanar(patches: PatchColumns, count: int, edge: float) -> None:
 
 
 @building_block
-def absorb(patches: PatchColumns, count: int, edge: float) -> None:
+def absorb(patches: PatchColumns, count: int, edge: float, into: np.ndarray, nodes: int) -> None:
     """Mark patches (of the first `count`) that lie in a larger one's box, or before it by no more than noise."""
     for small in range(count):
         for large in range(count):
             if small == large or patches.nodes[small] < 0 or patches.nodes[large] < 0:
                 continue
-            if patches.counts[small] <= _FEWER * patches.counts[large] and _lies_in(patches, small, large, edge):
+            lenience = _lenience(patches, small, large, into, nodes)
+            few = patches.counts[small] <= lenience * _FEWER * patches.counts[large]
+            if few and _lies_in(patches, small, large, edge, lenience):
+                into[nodes + patches.nodes[small]] = patches.nodes[large]
                 patches.nodes[small] = -1
 
 
+@inlined
+def _lenience(patches: PatchColumns, first: int, second: int, into: np.ndarray, nodes: int) -> float:
+    """Return the factor on tolerances: larger for patches that were together before."""
+    a, b = patches.nodes[first], patches.nodes[second]
+    return LENIENCE if into[nodes + a] == b or into[nodes + b] == a else 1.0
+
+
 @building_block
-def _lies_in(patches: PatchColumns, small: int, large: int, edge: float) -> bool:
+def _lies_in(patches: PatchColumns, small: int, large: int, edge: float, lenience: float) -> bool:
     if patches.roles[small] != patches.roles[large]:
         return False
     between = subtract(load(patches.means_m, small), load(patches.means_m, large))
     between = add(between, scale(patches.rises_m[small], normal_of(patches, small)))
     u, v, normal = axis_of(patches, large, 0), axis_of(patches, large, 1), normal_of(patches, large)
-    aside = 0.25 * edge
+    aside = 0.25 * lenience * edge
     for corner in range(4):
         away = add(between, _corner(patches, small, corner))
         a, b, c = dot(away, u), dot(away, v), dot(away, normal)
@@ -65,20 +83,20 @@ def _lies_in(patches: PatchColumns, small: int, large: int, edge: float) -> bool
             return False
         if b < patches.lows_m[large, 1] - aside or b > patches.highs_m[large, 1] + aside:
             return False
-        if c < -2.0 * edge or c > _FLAT_M + patches.rises_m[large] + patches.sds_m[large]:
+        if c < -2.0 * edge or c > patches.rises_m[large] + lenience * (_FLAT_M + patches.sds_m[large]):
             return False
     return True
 
 
 @building_block
-def _try(patches: PatchColumns, first: int, second: int, free: int, edge: float) -> bool:
+def _try(patches: PatchColumns, first: int, second: int, free: int, edge: float, lenience: float) -> bool:
     """Return whether the second patch could be merged into the first, which is then the whole."""
     if patches.roles[first] != patches.roles[second]:
         return False
     normal = normal_of(patches, first)
     if dot(normal, normal_of(patches, second)) < _ALIKE:
         return False
-    tolerance = _FLAT_M + max(patches.sds_m[first], patches.sds_m[second])
+    tolerance = lenience * (_FLAT_M + max(patches.sds_m[first], patches.sds_m[second]))
     between = subtract(load(patches.means_m, second), load(patches.means_m, first))
     reach = math.hypot(*_size(patches, first)) + math.hypot(*_size(patches, second))
     if dot(between, between) > reach * reach or abs(dot(between, normal)) > 2.0 * tolerance + 0.1 * edge:
@@ -94,7 +112,7 @@ def _try(patches: PatchColumns, first: int, second: int, free: int, edge: float)
         away = add(between, _corner(patches, second, corner))
         low_u, high_u = min(low_u, dot(away, u)), max(high_u, dot(away, u))
         low_v, high_v = min(low_v, dot(away, v)), max(high_v, dot(away, v))
-    gap = _BESIDE * edge
+    gap = lenience * _BESIDE * edge
     left, right = patches.lows_m[first, 0], patches.highs_m[first, 0]
     low, high = patches.lows_m[first, 1], patches.highs_m[first, 1]
     row = abs(low_v - low) <= gap and abs(high_v - high) <= gap and max(left, low_u) - min(right, high_u) <= gap

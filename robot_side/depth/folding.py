@@ -7,8 +7,8 @@ import numpy as np
 from common.arrays import FloatArray, IntArray
 from robot_side.compiled.columns import BUNDLE
 from robot_side.compiled.kernel import building_block, compiled, input_array, input_indices, output_indices
-from robot_side.compiled.vectors import Vector, add, dot, norm, scale, subtract, unit
-from robot_side.depth.collecting import SLOTS
+from robot_side.compiled.vectors import Vector, add, dot, load, norm, scale, subtract, unit
+from robot_side.depth.collecting import FURTHEST, SLOTS
 from robot_side.depth.grid import cell_at, indices_of
 from robot_side.depth.surfel_columns import Count, SurfelColumns, surfels_at
 from robot_side.depth.view import camera_position, pixels_across, sd_at, turned_to_world
@@ -16,8 +16,13 @@ from robot_side.depth.view import camera_position, pixels_across, sd_at, turned_
 _SIGMAS: Final = 3.0
 _FEW: Final = 0.15
 """Share of the pixels that a cell seen from ahead has, below which noise may explain them"""
+_AT_LEAST: Final = 1.5
+"""Pixels below which noise may explain them, however far they are"""
+_SETTLED: Final = 4.0
+"""Pictures that a surfel is worth from which pixels beside it may be its noise, although it has none itself"""
+_GRAZING: Final = 0.2
 _SIGMAS_IF_FEW: Final = 5.0
-_SHARE_IF_FEW: Final = 0.4
+_SHARE_IF_FEW: Final = 0.5
 """Share of the other surfel's pixels that they then have at most"""
 
 
@@ -46,22 +51,28 @@ def _is_noise(
 ) -> bool:
     """Return whether a surfel's points are but the noise of another one's, before or behind it."""
     edge, count, depth = place[3], surfels.sums[row, 0], surfels.sums[row, 13]
-    few = count < _FEW * pixels_across(view, edge, depth) ** 2
+    few = count < max(_FEW * pixels_across(view, edge, depth) ** 2, _AT_LEAST)
     if not few and surfels.weights[row] > 0.0:
         return False
     sigmas, most = (_SIGMAS_IF_FEW, _SHARE_IF_FEW) if few else (_SIGMAS, 1.0)
     point, near = mean_point(surfels, place, cells, row), sigmas * sd_at(view, depth)
     ray = unit(subtract(point, camera_position(view)))
-    for step in (0.5, -0.5, 1.0, -1.0):
+    for half in range(2, 2 * min(int(near / edge + 0.5), FURTHEST) + 4):
+        step = (0.25 if half % 2 else -0.25) * (half // 2 * 2)
         cell = cell_at(place, cells, add(point, scale(step * edge, ray)))
         other = slot[cell] if cell >= 0 else -1
-        if other < 0 or other == row or surfels.sums[other, 14] != surfels.sums[row, 14]:
+        if other < 0 or other == row:
             continue
-        if count < most * surfels.sums[other, 0]:
-            away = subtract(point, mean_point(surfels, place, cells, other))
-            normal = mean_normal(surfels, view, other)
-            if abs(dot(away, normal)) <= near * norm(normal) and norm(away) <= edge + near:
-                return True
+        there, normal = load(surfels.points_m, other), load(surfels.normals, other)
+        if surfels.sums[other, 14] == surfels.sums[row, 14]:
+            there, normal = mean_point(surfels, place, cells, other), mean_normal(surfels, view, other)
+            dominant = count <= most * surfels.sums[other, 0] and count < surfels.sums[other, 0]
+        else:
+            dominant = few and surfels.weights[other] >= _SETTLED
+        away, facing = subtract(point, there), unit(normal)
+        slant = max(abs(dot(ray, facing)), _GRAZING)
+        if dominant and abs(dot(away, facing)) <= near * slant and norm(away) <= edge + near:
+            return True
     return False
 
 

@@ -11,10 +11,10 @@ from robot_side.compiled.vectors import Vector, add, dot, load, scale, subtract
 from robot_side.depth.coplanar import axis_of
 from robot_side.depth.patch_columns import BoxColumns, BoxCount, PatchColumns
 
-_SIDEWAYS: Final = 0.3
+_SIDEWAYS: Final = 0.4
 """Cells by which an edge may differ"""
 _AHEAD_M: Final = 0.0003
-_AHEAD: Final = 0.25
+_AHEAD: Final = 0.5
 """Distance by which a corner of the front may differ: in m, and in standard deviations of a pixel"""
 _THICK: Final = 2.0
 """Cells of which a box is thick, unless it is narrower"""

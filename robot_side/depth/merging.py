@@ -22,7 +22,7 @@ from robot_side.depth.surfel_columns import Count, SurfelColumns, surfels_at
 from robot_side.depth.view import camera_position, sd_at
 
 _SIGMAS: Final = 3.0
-MOST_WEIGHT: Final = 8.0
+MOST_WEIGHT: Final = 16.0
 """Number of pictures that a mean is worth at most, so that it follows what changes"""
 APPEARS: Final = 2
 """Pictures after which a surfel is shown"""
@@ -34,8 +34,8 @@ _NOISE: Final = 0.6
 """Share of a pixel's variance that shows within a surface, as neighbours' errors are alike"""
 _GRAZING: Final = 0.04
 """Least square of the cosine between a ray and a normal that counts"""
-_MOVED_M: Final = 0.0003
-"""Motion of a surfel, beyond half the standard deviation of a pixel, that makes its surface be looked at again"""
+_MOVED_M: Final = 0.0005
+"""Motion of a surfel, beyond the standard deviation of a pixel, that makes its surface be looked at again"""
 DIRTY: Final = array_of(np.uint8, 1)
 """Numba type of the blocks' marks (b,): 1 where surfaces are to be looked for again"""
 
@@ -115,7 +115,7 @@ def merge(
         elif surfels.shown[row]:
             away_from = subtract(load(surfels.points_m, row), load(surfels.looked_m, row))
             along = abs(dot(away_from, unit(load(surfels.normals, row))))
-            changed = changed or along > _MOVED_M + 0.5 * surfels.sds_m[row] or norm(away_from) > 0.3 * edge
+            changed = changed or along > _MOVED_M + surfels.sds_m[row] or norm(away_from) > 0.4 * edge
             # Once its mean has settled, the surface is looked at for good.
             changed = changed or (weight < MOST_WEIGHT and surfels.weights[row] == MOST_WEIGHT)
         if changed and surfels.shown[row]:

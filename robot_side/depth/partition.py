@@ -14,7 +14,7 @@ from robot_side.depth.surfel_columns import SurfelColumns
 
 NODES: Final = (8 ** (LEVELS + 1) - 1) // 7
 """Nodes of a block's octree"""
-_LENIENCE: Final = 1.4
+LENIENCE: Final = 1.4
 """Factor on the tolerances for a node that was a patch before, so that it stays one"""
 _new_stack = on_stack(8 * (LEVELS + 1), 3, dtype=np.int64)
 _new_ends = on_stack(9, dtype=np.int64)
@@ -64,11 +64,11 @@ def divide(
         if single or end - start > 2:
             sum_up(surfels, members, start, end, patches, found)
             choose_normal(patches, found, edge)
-            lenience = _LENIENCE if was_patch[nodes + node] else 1.0
+            lenience = LENIENCE if was_patch[nodes + node] else 1.0
             flat = single or is_flat(surfels, members, start, end, patches, found, edge, lenience)
             if flat:
                 lay_rectangle(surfels, members, start, end, patches, found)
-                flat = single or is_filled(surfels, members, start, end, patches, found, edge)
+                flat = single or is_filled(surfels, members, start, end, patches, found, edge, lenience)
             was_patch[nodes + node] = flat
             if flat:
                 measure_rise(patches, found, edge)

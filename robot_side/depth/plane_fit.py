@@ -186,9 +186,16 @@ def lay_rectangle(
 
 @building_block
 def is_filled(
-    surfels: SurfelColumns, members: IntArray, start: int, end: int, patches: PatchColumns, patch: int, edge: float
+    surfels: SurfelColumns,
+    members: IntArray,
+    start: int,
+    end: int,
+    patches: PatchColumns,
+    patch: int,
+    edge: float,
+    lenience: float,
 ) -> bool:
-    """Return whether surfels fill their patch's rectangle, but for a thirtieth of its cells."""
+    """Return whether surfels fill their patch's rectangle, but for a thirtieth of its cells, times the lenience."""
     raster, mean = _new_raster(), load(patches.means_m, patch)
     u = patches.axes[patch, 0], patches.axes[patch, 1], patches.axes[patch, 2]
     v = patches.axes[patch, 3], patches.axes[patch, 4], patches.axes[patch, 5]
@@ -213,4 +220,4 @@ def is_filled(
             for j in range(max(lowest, 0), min(top, up - 1) + 1):
                 empty -= raster[i, j] == 0
                 raster[i, j] = 1
-    return empty * 30 <= across * up
+    return empty * 30.0 <= lenience * across * up

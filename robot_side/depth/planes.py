@@ -45,6 +45,7 @@ class Planes:
         self._first_box = np.full(blocks, -1, dtype=np.int32)
         self._box_of = np.full(blocks * NODES, -1, dtype=np.int32)
         self._was_patch = np.zeros(blocks * NODES, dtype=np.uint8)
+        self._into = np.full(blocks * NODES, -1, dtype=np.int32)
         self._members = np.zeros((2, _SIDE**3), dtype=np.int64)
         self._counts = np.zeros(len(BoxCount), dtype=np.int64)
 
@@ -63,6 +64,7 @@ class Planes:
                 self._first_box,
                 self._box_of,
                 self._was_patch,
+                self._into,
                 *self._members,
                 self._counts,
             )
@@ -91,7 +93,7 @@ class Planes:
 
 
 @compiled(
-    *(INT64, BUNDLE, SLOTS, input_array(1), input_indices(), BUNDLE, BUNDLE, SLOTS, SLOTS, DIRTY),
+    *(INT64, BUNDLE, SLOTS, input_array(1), input_indices(), BUNDLE, BUNDLE, SLOTS, SLOTS, DIRTY, SLOTS),
     *(output_indices(), output_indices(), output_indices()),
 )
 def _look_again(
@@ -105,6 +107,7 @@ def _look_again(
     first_box: np.ndarray,
     box_of: np.ndarray,
     was_patch: np.ndarray,
+    into: np.ndarray,
     members: IntArray,
     spare: IntArray,
     counts: IntArray,
@@ -126,8 +129,8 @@ def _look_again(
     found = 0
     if count > 0:
         found = divide(surfels, cells, members, spare, count, patches, place[3], was_patch, block * NODES)
-        merge_coplanar(patches, found, place[3])
-        absorb(patches, found, place[3])
+        merge_coplanar(patches, found, place[3], into, block * NODES)
+        absorb(patches, found, place[3], into, block * NODES)
     row = first_box[block]
     while row >= 0:
         boxes.found[row] = 0

@@ -24,7 +24,7 @@ _UNANSWERED_S: Final = 1.9
 """Time in view without an answer after which a surfel is gone: with the next picture, within 2 s"""
 _MOST_HOLES: Final = 4
 """Pixels without depth, of nine, with which a place still has an answer"""
-_FINE: Final = 2.0
+_FINE: Final = 1.2
 """Pixels across a cell from which on each surfel in view should have some"""
 _NEAR: Final = 1.1
 """Factor on the least range within which a surface may already be too near"""
@@ -87,7 +87,7 @@ def look_for_unseen(
         elif least > a[2] - sd - 0.5 * edge and pixels_across(view, edge, a[2]) >= _FINE:
             # Something is measured about there, but at other surfels, and so often that it is noise.
             surfels.unanswered_s[row] += elapsed_s
-            gone = surfels.unanswered_s[row] > _UNANSWERED_S
+            gone = not surfels.shown[row] or surfels.unanswered_s[row] > _UNANSWERED_S
             counts[Count.CONTRADICTED] += gone
         if gone:
             if surfels.shown[row]:
