@@ -30,6 +30,8 @@ MOST_EVIDENCE: Final = 3
 """Pictures against it after which a surfel is gone, at most"""
 _ASTRAY: Final = 3
 """Successive pictures that put a surfel elsewhere after which it is there"""
+_SETTLED: Final = 4.0
+"""Number of pictures that a mean is worth when its surface is looked at again"""
 _NOISE: Final = 0.6
 """Share of a pixel's variance that shows within a surface, as neighbours' errors are alike"""
 _GRAZING: Final = 0.04
@@ -116,7 +118,7 @@ def merge(
             away_from = subtract(load(surfels.points_m, row), load(surfels.looked_m, row))
             along = abs(dot(away_from, unit(load(surfels.normals, row))))
             changed = changed or along > _MOVED_M + surfels.sds_m[row] or norm(away_from) > 0.4 * edge
-            # Once its mean has settled, the surface is looked at for good.
-            changed = changed or (weight < MOST_WEIGHT and surfels.weights[row] == MOST_WEIGHT)
+            # Its first mean is rough.
+            changed = changed or weight < _SETTLED <= surfels.weights[row]
         if changed and surfels.shown[row]:
             dirty[block_of(cells, surfels.cells[row])] = 1

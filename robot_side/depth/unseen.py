@@ -24,6 +24,8 @@ _UNANSWERED_S: Final = 1.9
 """Time in view without an answer after which a surfel is gone: with the next picture, within 2 s"""
 _MOST_HOLES: Final = 4
 """Pixels without depth, of nine, with which a place still has an answer"""
+_HIDDEN: Final = 4.0
+"""Standard deviations behind what is measured from which a surfel is hidden"""
 _FINE: Final = 1.2
 """Pixels across a cell from which on each surfel in view should have some"""
 _NEAR: Final = 1.1
@@ -84,7 +86,9 @@ def look_for_unseen(
             surfels.evidence[row] -= 1
             gone = surfels.evidence[row] <= 0
             counts[Count.CONTRADICTED] += gone
-        elif least > a[2] - sd - 0.5 * edge and pixels_across(view, edge, a[2]) >= _FINE:
+        elif pixels_across(view, edge, a[2]) >= _FINE and (
+            not surfels.shown[row] or least > a[2] - _HIDDEN * sd - edge
+        ):
             # Something is measured about there, but at other surfels, and so often that it is noise.
             surfels.unanswered_s[row] += elapsed_s
             gone = not surfels.shown[row] or surfels.unanswered_s[row] > _UNANSWERED_S
