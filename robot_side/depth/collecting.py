@@ -8,7 +8,7 @@ from common.arrays import FloatArray, IntArray
 from robot_side.compiled.columns import BUNDLE
 from robot_side.compiled.kernel import array_of, compiled, input_array, input_indices, output_indices
 from robot_side.compiled.vectors import add, dot, load, norm, scale, subtract
-from robot_side.depth.grid import cell_at, indices_of
+from robot_side.depth.grid import cell_at
 from robot_side.depth.picture import DepthArray, LabelArray
 from robot_side.depth.surfel_columns import Count, surfels_at
 from robot_side.depth.view import DIRECTIONS, MASK, PICTURE, ray_at, sd_at, to_world, turned_to_world
@@ -98,10 +98,7 @@ def collect(
                 sums[row, 13] = z
                 sums[row, 14] = counts[Count.PICTURE]
                 surfels.votes[row] = 0
-            a, b, c = indices_of(cells, surfels.cells[row])
-            u = point[0] - (place[0] + (a + 0.5) * edge)
-            v = point[1] - (place[1] + (b + 0.5) * edge)
-            w = point[2] - (place[2] + (c + 0.5) * edge)
+            u, v, w = point[0] - place[0], point[1] - place[1], point[2] - place[2]
             sums[row, 0] += 1.0
             sums[row, 1] += u
             sums[row, 2] += v

@@ -9,7 +9,7 @@ from robot_side.compiled.columns import BUNDLE
 from robot_side.compiled.kernel import building_block, compiled, input_array, input_indices, output_indices
 from robot_side.compiled.vectors import Vector, add, dot, load, norm, scale, subtract, unit
 from robot_side.depth.collecting import FURTHEST, SLOTS
-from robot_side.depth.grid import cell_at, indices_of
+from robot_side.depth.grid import cell_at
 from robot_side.depth.surfel_columns import Count, SurfelColumns, surfels_at
 from robot_side.depth.view import camera_position, pixels_across, sd_at, turned_to_world
 
@@ -27,14 +27,11 @@ _SHARE_IF_FEW: Final = 0.5
 
 
 @building_block
-def mean_point(surfels: SurfelColumns, place: FloatArray, cells: IntArray, row: int) -> Vector:
+def mean_point(surfels: SurfelColumns, place: FloatArray, row: int) -> Vector:
     """Return the mean of the newest picture's points on a surfel."""
-    a, b, c = indices_of(cells, surfels.cells[row])
-    count, edge = surfels.sums[row, 0], place[3]
-    return (
-        place[0] + (a + 0.5) * edge + surfels.sums[row, 1] / count,
-        place[1] + (b + 0.5) * edge + surfels.sums[row, 2] / count,
-        place[2] + (c + 0.5) * edge + surfels.sums[row, 3] / count,
+    by = 1.0 / surfels.sums[row, 0]
+    return add(
+        (place[0], place[1], place[2]), scale(by, (surfels.sums[row, 1], surfels.sums[row, 2], surfels.sums[row, 3]))
     )
 
 
@@ -55,7 +52,7 @@ def _is_noise(
     if not few and surfels.weights[row] > 0.0:
         return False
     sigmas, most = (_SIGMAS_IF_FEW, _SHARE_IF_FEW) if few else (_SIGMAS, 1.0)
-    point, near = mean_point(surfels, place, cells, row), sigmas * sd_at(view, depth)
+    point, near = mean_point(surfels, place, row), sigmas * sd_at(view, depth)
     ray = unit(subtract(point, camera_position(view)))
     for half in range(2, 2 * min(int(near / edge + 0.5), FURTHEST) + 4):
         step = (0.25 if half % 2 else -0.25) * (half // 2 * 2)
@@ -65,7 +62,7 @@ def _is_noise(
             continue
         there, normal = load(surfels.points_m, other), load(surfels.normals, other)
         if surfels.sums[other, 14] == surfels.sums[row, 14]:
-            there, normal = mean_point(surfels, place, cells, other), mean_normal(surfels, view, other)
+            there, normal = mean_point(surfels, place, other), mean_normal(surfels, view, other)
             dominant = count <= most * surfels.sums[other, 0] and count < surfels.sums[other, 0]
         else:
             dominant = few and surfels.weights[other] >= _SETTLED

@@ -22,7 +22,7 @@ class Grid:
     """Cells in a box of the world."""
 
     place: FloatArray
-    """(4,) lower corner and edge of a cell, in m"""
+    """(5,) lower corner and edge of a cell, in m, and cells in a metre"""
     cells: IntArray
     """(3,) number of cells along each axis"""
 
@@ -31,7 +31,7 @@ class Grid:
         """Return the cells of the settings' region."""
         # Tables and walls often stand at round numbers: there no blocks should meet, as noise would divide a plane.
         lower_m = np.array(settings.lower_m) - _ASIDE * settings.cell_m
-        return Grid(np.array([*lower_m, settings.cell_m]), np.array(settings.cells) + 1)
+        return Grid(np.array([*lower_m, settings.cell_m, 1.0 / settings.cell_m]), np.array(settings.cells) + 1)
 
     @property
     def blocks(self) -> IntArray:
@@ -42,9 +42,9 @@ class Grid:
 @inlined
 def cell_at(place: FloatArray, cells: IntArray, a: Vector) -> int:
     """Return the number of the cell that holds a point; -1 outside the region."""
-    i = math.floor((a[0] - place[0]) / place[3])
-    j = math.floor((a[1] - place[1]) / place[3])
-    k = math.floor((a[2] - place[2]) / place[3])
+    i = math.floor((a[0] - place[0]) * place[4])
+    j = math.floor((a[1] - place[1]) * place[4])
+    k = math.floor((a[2] - place[2]) * place[4])
     if i < 0 or j < 0 or k < 0 or i >= cells[0] or j >= cells[1] or k >= cells[2]:
         return -1
     return (i * cells[1] + j) * cells[2] + k

@@ -77,7 +77,7 @@ def merge(
         sums = surfels.sums
         count = sums[row, 0]
         u, v, w = sums[row, 1] / count, sums[row, 2] / count, sums[row, 3] / count
-        point, normal = mean_point(surfels, place, cells, row), mean_normal(surfels, view, row)
+        point, normal = mean_point(surfels, place, row), mean_normal(surfels, view, row)
         sd, pixel = sd_at(view, sums[row, 13]), sums[row, 13] / view[0]
         noise = _NOISE * sd * sd
         weight, new, astray = surfels.weights[row], 1.0, False
