@@ -92,4 +92,6 @@ def _is_near(
         max(abs(far_u - boxes.halves_m[row, 0]), abs(low_u + boxes.halves_m[row, 0])),
         max(abs(far_v - boxes.halves_m[row, 1]), abs(low_v + boxes.halves_m[row, 1])),
     )
-    return aside <= _SIDEWAYS * edge and off <= _AHEAD_M + _AHEAD * boxes.sds_m[row]
+    # Many surfels together know their plane better.
+    share = min(1.0, 2.0 / math.sqrt(patches.counts[patch]))
+    return aside <= _SIDEWAYS * edge and off <= _AHEAD_M + _AHEAD * share * boxes.sds_m[row]

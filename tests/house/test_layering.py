@@ -51,6 +51,7 @@ ARROWS = """
         robot_side/surroundings/kinds
     robot_side/field: common robot_side/arm robot_side/compiled robot_side/enlargement robot_side/surroundings
         robot_side/surroundings/kinds
+    robot_side/depth: common robot_side/compiled robot_side/surroundings robot_side/surroundings/kinds
     robot_side/gripper: common common/files robot_side/arm robot_side/overlap/meshes robot_side/surroundings
     robot_side/tick: common common/protocol robot_side/arm robot_side/surroundings
     robot_side/commissioning: common common/command common/sockets/door robot_side/arm robot_side/drivers/mujoco
