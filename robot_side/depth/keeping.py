@@ -88,10 +88,8 @@ def _is_near(
         far_u, low_u = max(far_u, dot(away, u)), min(low_u, dot(away, u))
         far_v, low_v = max(far_v, dot(away, v)), min(low_v, dot(away, v))
         off = max(off, abs(dot(away, w) - boxes.halves_m[row, 2]))
-    aside = max(
-        max(abs(far_u - boxes.halves_m[row, 0]), abs(low_u + boxes.halves_m[row, 0])),
-        max(abs(far_v - boxes.halves_m[row, 1]), abs(low_v + boxes.halves_m[row, 1])),
-    )
+    a, b = boxes.halves_m[row, 0], boxes.halves_m[row, 1]
+    aside = max(abs(far_u - a), abs(low_u + a), abs(far_v - b), abs(low_v + b))
     # Many surfels together know their plane better.
     share = min(1.0, 2.0 / math.sqrt(patches.counts[patch]))
     return aside <= _SIDEWAYS * edge and off <= _AHEAD_M + _AHEAD * share * boxes.sds_m[row]

@@ -50,12 +50,11 @@ def _average_spread(
     slant = dot(ray, facing)
     # A pixel is a small rectangle on the surface, longer the more the view grazes it.
     across, longer = subtract(ray, scale(slant, facing)), small_m2 / max(slant * slant, _GRAZING)
-    sums, by, place = surfels.sums, 1.0 / surfels.sums[row, 0], 0
-    for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)):
+    sums, by = surfels.sums, 1.0 / surfels.sums[row, 0]
+    for i, j, place in ((0, 0, 0), (1, 1, 1), (2, 2, 2), (0, 1, 3), (0, 2, 4), (1, 2, 5)):
         pixel = (small_m2 if i == j else 0.0) - small_m2 * facing[i] * facing[j] + longer * across[i] * across[j]
         spread = by * sums[row, 4 + place] - by * by * sums[row, 1 + i] * sums[row, 1 + j] + pixel
         surfels.spreads_m2[row, place] += share * (spread - surfels.spreads_m2[row, place])
-        place += 1
 
 
 @compiled(
@@ -75,8 +74,6 @@ def merge(
     for t in range(counts[Count.TOUCHED]):
         row = surfels.touched[t]
         sums = surfels.sums
-        count = sums[row, 0]
-        u, v, w = sums[row, 1] / count, sums[row, 2] / count, sums[row, 3] / count
         point, normal = mean_point(surfels, place, row), mean_normal(surfels, view, row)
         sd, pixel = sd_at(view, sums[row, 13]), sums[row, 13] / view[0]
         noise = _NOISE * sd * sd

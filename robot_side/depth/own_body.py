@@ -49,7 +49,7 @@ def _beyond(kind: int, size: Vector, point: Vector) -> float:
     if kind == _ELLIPSOID:
         # Along the way to the centre the surface is further than across it by at most the ratio of the axes.
         length = norm((x / size[0], y / size[1], z / size[2]))
-        return (length - 1.0) * min(size[0], min(size[1], size[2]))
+        return (length - 1.0) * min(size[0], size[1], size[2])
     return norm((x, y, z)) - size[0]
 
 
@@ -63,7 +63,7 @@ def _radius(kind: int, size: Vector) -> float:
     if kind == _CYLINDER:
         return math.sqrt(size[0] * size[0] + size[1] * size[1])
     if kind == _ELLIPSOID:
-        return max(size[0], max(size[1], size[2]))
+        return max(size[0], size[1], size[2])
     return size[0]
 
 

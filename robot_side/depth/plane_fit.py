@@ -113,7 +113,7 @@ def normal_of(patches: PatchColumns, patch: int) -> Vector:
 
 @building_block
 def measure_rise(patches: PatchColumns, patch: int, edge: float) -> None:
-    """Write how far before its mean the patch's foremost is: that of a cap, or a rod, with its variance but for noise."""
+    """Write how far before its mean the patch's foremost is: as a cap's or a rod's, from its variance but for noise."""
     normal = normal_of(patches, patch)
     variance = along(patches.moments_m2, patch, normal) + along(patches.spreads_m2, patch, normal)
     patches.rises_m[patch] = min(_ROOT3 * math.sqrt(max(variance - patches.noises_m2[patch], 0.0)), 0.5 * edge)
@@ -150,7 +150,7 @@ def is_flat(
 def lay_rectangle(
     surfels: SurfelColumns, members: IntArray, start: int, end: int, patches: PatchColumns, patch: int
 ) -> None:
-    """Write the axes and ends of the smallest rectangle around surfels: one way along the patch, others by the world."""
+    """Write the axes and ends of the smallest rectangle around surfels, of a few ways in which it may be turned."""
     normal, mean = normal_of(patches, patch), load(patches.means_m, patch)
     long = patches.axes[patch, 0], patches.axes[patch, 1], patches.axes[patch, 2]
     x, y, z = abs(normal[0]), abs(normal[1]), abs(normal[2])

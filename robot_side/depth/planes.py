@@ -6,7 +6,7 @@ import numpy as np
 
 from common.arrays import FloatArray, IntArray
 from robot_side.compiled.columns import BUNDLE
-from robot_side.compiled.kernel import INT64, compiled, input_array, input_indices, output_indices
+from robot_side.compiled.kernel import INT64, building_block, compiled, input_array, input_indices, output_indices
 from robot_side.depth.boxes import Boxes
 from robot_side.depth.collecting import SLOTS
 from robot_side.depth.coplanar import absorb, merge_coplanar
@@ -25,7 +25,7 @@ from robot_side.depth.patch_columns import (
     patch_columns,
     patches_at,
 )
-from robot_side.depth.surfel_columns import surfels_at
+from robot_side.depth.surfel_columns import SurfelColumns, surfels_at
 from robot_side.depth.surfels import SurfelMap
 
 _SIDE: Final = 1 << LEVELS
@@ -50,7 +50,7 @@ class Planes:
         self._counts = np.zeros(len(BoxCount), dtype=np.int64)
 
     def follow(self, surfels: SurfelMap) -> int:
-        """Look again at the blocks that are marked, and unmark them; return how many boxes are new, gone or elsewhere."""
+        """Look again at the marked blocks, and unmark them; return how many boxes are new, gone or elsewhere."""
         self._counts[BoxCount.CHANGED] = 0
         for block in np.flatnonzero(surfels.dirty):
             _look_again(
@@ -92,6 +92,47 @@ class Planes:
         )
 
 
+@building_block
+def _let_go(
+    patches: PatchColumns, count: int, boxes: BoxColumns, box_of: np.ndarray, nodes: int, first: int, counts: IntArray
+) -> None:
+    """Free the boxes of a block, of which `first` is the first, whose nodes are no patches any more."""
+    row = first
+    while row >= 0:
+        boxes.found[row] = 0
+        row = boxes.following[row]
+    for patch in range(count):
+        if patches.nodes[patch] >= 0 and box_of[nodes + patches.nodes[patch]] >= 0:
+            boxes.found[box_of[nodes + patches.nodes[patch]]] = 1
+    row = first
+    while row >= 0:
+        if boxes.found[row] == 0:
+            box_of[boxes.nodes[row]] = -1
+            boxes.nodes[row] = -1
+            boxes.free[counts[BoxCount.FREE]] = row
+            counts[BoxCount.FREE] += 1
+            counts[BoxCount.CHANGED] += 1
+        row = boxes.following[row]
+
+
+@building_block
+def _gather(surfels: SurfelColumns, slot: np.ndarray, cells: IntArray, block: int, members: IntArray) -> int:
+    """Write the rows of a block's shown surfels into `members`, and note where they are; return their number."""
+    across, up = ((cells[1] - 1) >> LEVELS) + 1, ((cells[2] - 1) >> LEVELS) + 1
+    a, b, c = block // (across * up) * _SIDE, block // up % across * _SIDE, block % up * _SIDE
+    count = 0
+    for i in range(a, min(a + _SIDE, cells[0])):
+        for j in range(b, min(b + _SIDE, cells[1])):
+            for k in range(c, min(c + _SIDE, cells[2])):
+                row = slot[(i * cells[1] + j) * cells[2] + k]
+                if row >= 0 and surfels.shown[row]:
+                    members[count] = row
+                    count += 1
+                    for axis in range(3):
+                        surfels.looked_m[row, axis] = surfels.points_m[row, axis]
+    return count
+
+
 @compiled(
     *(INT64, BUNDLE, SLOTS, input_array(1), input_indices(), BUNDLE, BUNDLE, SLOTS, SLOTS, DIRTY, SLOTS),
     *(output_indices(), output_indices(), output_indices()),
@@ -114,42 +155,14 @@ def _look_again(
 ) -> None:
     """Divide a block's surfels into patches, and let its boxes follow them."""
     surfels, patches, boxes = surfels_at(surfel_bundle), patches_at(patch_bundle), boxes_at(box_bundle)
-    across, up = ((cells[1] - 1) >> LEVELS) + 1, ((cells[2] - 1) >> LEVELS) + 1
-    a, b, c = block // (across * up) * _SIDE, block // up % across * _SIDE, block % up * _SIDE
-    count = 0
-    for i in range(a, min(a + _SIDE, cells[0])):
-        for j in range(b, min(b + _SIDE, cells[1])):
-            for k in range(c, min(c + _SIDE, cells[2])):
-                row = slot[(i * cells[1] + j) * cells[2] + k]
-                if row >= 0 and surfels.shown[row]:
-                    members[count] = row
-                    count += 1
-                    for e in range(3):
-                        surfels.looked_m[row, e] = surfels.points_m[row, e]
+    count = _gather(surfels, slot, cells, block, members)
     found = 0
     if count > 0:
         found = divide(surfels, cells, members, spare, count, patches, place[3], was_patch, block * NODES)
         merge_coplanar(patches, found, place[3], into, block * NODES)
         absorb(patches, found, place[3], into, block * NODES)
-    row = first_box[block]
-    while row >= 0:
-        boxes.found[row] = 0
-        row = boxes.following[row]
-    before = first_box[block]
+    _let_go(patches, found, boxes, box_of, block * NODES, first_box[block], counts)
     first_box[block] = -1
-    # Boxes of nodes that have one keep their rows; the others' rows are freed before new ones take any.
-    for patch in range(found):
-        if patches.nodes[patch] >= 0 and box_of[block * NODES + patches.nodes[patch]] >= 0:
-            boxes.found[box_of[block * NODES + patches.nodes[patch]]] = 1
-    while before >= 0:
-        following = boxes.following[before]
-        if boxes.found[before] == 0:
-            box_of[boxes.nodes[before]] = -1
-            boxes.nodes[before] = -1
-            boxes.free[counts[BoxCount.FREE]] = before
-            counts[BoxCount.FREE] += 1
-            counts[BoxCount.CHANGED] += 1
-        before = following
     for patch in range(found):
         if patches.nodes[patch] >= 0:
             row = keep_or_write(patches, patch, boxes, box_of, block * NODES + patches.nodes[patch], place[3], counts)

@@ -1,6 +1,6 @@
 """A fixed pool of objects for the map's boxes, of which only the changes are handed on.
 
-Each slot is an object `surface 0` to `surface n - 1` of one box. Unused slots are parked far away, with volume, as a box
+Each slot is an object `surface 0` to `surface n - 1` of one box. Unused slots are parked far away, with volume: a box
 without volume would make a scene's table be built anew. The process of the map calls `update`, that of the law `apply`.
 """
 

@@ -73,8 +73,8 @@ def _normals(depth_m: DepthArray, view: FloatArray, found: DepthArray) -> None:
             left, right = depth_m[i, j - _APART], depth_m[i, j + _APART]
             above, below = depth_m[i - _APART, j], depth_m[i + _APART, j]
             step = _STEP[0] * z + _STEP[1]
-            far = max(max(abs(left - z), abs(right - z)), max(abs(above - z), abs(below - z)))
-            if far > step or min(min(left, right), min(above, below)) <= 0.0:
+            far = max(abs(left - z), abs(right - z), abs(above - z), abs(below - z))
+            if far > step or min(left, right, above, below) <= 0.0:
                 continue
             x, y = ray_at(view, i, j)
             across, down = _APART / view[0], _APART / view[1]

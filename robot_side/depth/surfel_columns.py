@@ -7,7 +7,7 @@ from common.arrays import FloatArray, IntArray
 from robot_side.compiled.columns import INDICES, NUMBERS, Declared, rows
 
 SUMS: Final = 15
-"""Sums of a picture's pixels on one surfel: count, offsets from the region's corner (3), their products (6), normals (3),
+"""Sums of the pixels on one surfel: count, offsets from the region's corner (3), their products (6), normals (3),
 the least depth, and the picture's number"""
 
 

@@ -4,13 +4,14 @@ Contradicted: something is measured behind it. In view without an answer: nothin
 view, too near or hidden: it is kept, as time alone says nothing. Else the wall just ahead of a wrist camera would go.
 """
 
+import math
 from typing import Final
 
 import numpy as np
 
 from common.arrays import FloatArray, IntArray
 from robot_side.compiled.columns import BUNDLE
-from robot_side.compiled.kernel import FLOAT64, compiled, input_array, input_indices, output_indices
+from robot_side.compiled.kernel import FLOAT64, building_block, compiled, input_array, input_indices, output_indices
 from robot_side.compiled.vectors import load
 from robot_side.depth.collecting import SLOTS
 from robot_side.depth.grid import block_of
@@ -30,6 +31,21 @@ _FINE: Final = 1.2
 """Pixels across a cell from which on each surfel in view should have some"""
 _NEAR: Final = 1.1
 """Factor on the least range within which a surface may already be too near"""
+
+
+@building_block
+def _window(depth_m: DepthArray, own: LabelArray, row: int, column: int) -> tuple[float, int]:
+    """Return the least depth in a window of nine pixels, and how many have none; -1 if it shows the robot."""
+    least, holes = math.inf, 0
+    for i in range(row - 1, row + 2):
+        for j in range(column - 1, column + 2):
+            if own[i, j]:
+                return 0.0, -1
+            if depth_m[i, j] <= 0.0:
+                holes += 1
+            else:
+                least = min(least, 1.0 * depth_m[i, j])
+    return least, holes
 
 
 @compiled(
@@ -64,15 +80,8 @@ def look_for_unseen(
         i, j = pixel_of(view, a)
         if i < 1 or j < 1 or i >= height - 1 or j >= width - 1:
             continue
-        least, holes, robot = view[MOST], 0, False
-        for k in range(i - 1, i + 2):
-            for m in range(j - 1, j + 2):
-                robot = robot or own[k, m] != 0
-                if depth_m[k, m] <= 0.0:
-                    holes += 1
-                else:
-                    least = min(least, 1.0 * depth_m[k, m])
-        if robot:
+        least, holes = _window(depth_m, own, i, j)
+        if holes < 0:
             continue
         gone = False
         if holes > _MOST_HOLES:

@@ -1,4 +1,4 @@
-"""Depth pictures of scenes of planes, boxes, balls and rods, by casting rays; noise of disparity, alike in neighbours."""
+"""Depth pictures of scenes of planes, boxes, balls and rods, by casting rays, with noise alike in neighbours."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -83,7 +83,11 @@ class Camera:
         return np.where(np.isfinite(found), found, 0.0).reshape(self.height, self.width)
 
     def picture(
-        self, things: Sequence[Thing], taken_s: float = 0.0, noise: np.random.Generator | None = None, level: float = 1.0
+        self,
+        things: Sequence[Thing],
+        taken_s: float = 0.0,
+        noise: np.random.Generator | None = None,
+        level: float = 1.0,
     ) -> DepthPicture:
         """Return a picture; noise: draws errors of the camera's own size, times `level`."""
         z = self.depth_m(things)
