@@ -7,12 +7,12 @@ import numpy as np
 from robot_side.depth.boxes import Boxes
 from robot_side.depth.free_space import SeenSpace
 from robot_side.depth.grid import Grid
+from robot_side.depth.octree.planes import Planes
 from robot_side.depth.own_body import own_pixels
 from robot_side.depth.picture import CameraPose, DepthErrors, DepthPicture, OwnBody
-from robot_side.depth.planes import Planes
 from robot_side.depth.settings import MapSettings
 from robot_side.depth.support import normals, supported
-from robot_side.depth.surfels import SurfelMap
+from robot_side.depth.surfel_map.surfels import SurfelMap
 from robot_side.depth.view import view_of
 
 

@@ -52,6 +52,9 @@ ARROWS = """
     robot_side/field: common robot_side/arm robot_side/compiled robot_side/enlargement robot_side/surroundings
         robot_side/surroundings/kinds
     robot_side/depth: common robot_side/compiled robot_side/surroundings robot_side/surroundings/kinds
+    robot_side/depth/surfel_map: common robot_side/compiled robot_side/depth
+    robot_side/depth/octree: common robot_side/compiled robot_side/depth robot_side/depth/surfel_map
+    robot_side/depth/depth_map.py: robot_side/depth robot_side/depth/octree robot_side/depth/surfel_map
     robot_side/gripper: common common/files robot_side/arm robot_side/overlap/meshes robot_side/surroundings
     robot_side/tick: common common/protocol robot_side/arm robot_side/surroundings
     robot_side/commissioning: common common/command common/sockets/door robot_side/arm robot_side/drivers/mujoco

@@ -7,13 +7,13 @@ import numpy as np
 
 from common.arrays import FloatArray, IntArray
 from common.roles import ROLES
-from robot_side.depth.collecting import collect
-from robot_side.depth.folding import fold_layers
 from robot_side.depth.grid import Grid
-from robot_side.depth.merging import merge
 from robot_side.depth.picture import DepthArray, DepthPicture, LabelArray
-from robot_side.depth.surfel_columns import SURFELS, Count, SurfelColumns, surfel_columns
-from robot_side.depth.unseen import look_for_unseen
+from robot_side.depth.surfel_map.collecting import collect
+from robot_side.depth.surfel_map.folding import fold_layers
+from robot_side.depth.surfel_map.merging import merge
+from robot_side.depth.surfel_map.surfel_columns import SURFELS, Count, SurfelColumns, surfel_columns
+from robot_side.depth.surfel_map.unseen import look_for_unseen
 
 _ROOM: Final = 200_000
 """Largest number of surfels"""

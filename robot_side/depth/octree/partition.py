@@ -8,9 +8,9 @@ from common.arrays import IntArray
 from robot_side.compiled.kernel import building_block, inlined
 from robot_side.compiled.stack import on_stack
 from robot_side.depth.grid import LEVELS, indices_of
-from robot_side.depth.patch_columns import PatchColumns
-from robot_side.depth.plane_fit import choose_normal, is_filled, is_flat, lay_rectangle, measure_rise, sum_up
-from robot_side.depth.surfel_columns import SurfelColumns
+from robot_side.depth.octree.patch_columns import PatchColumns
+from robot_side.depth.octree.plane_fit import choose_normal, is_filled, is_flat, lay_rectangle, measure_rise, sum_up
+from robot_side.depth.surfel_map.surfel_columns import SurfelColumns
 
 NODES: Final = (8 ** (LEVELS + 1) - 1) // 7
 """Nodes of a block's octree"""

@@ -9,9 +9,9 @@ from common.arrays import FloatArray, IntArray
 from robot_side.compiled.kernel import building_block, inlined
 from robot_side.compiled.stack import on_stack
 from robot_side.compiled.vectors import Vector, cross, dot, load, norm, scale, subtract, unit
-from robot_side.depth.eigen import principal_axes
-from robot_side.depth.patch_columns import PatchColumns
-from robot_side.depth.surfel_columns import SurfelColumns
+from robot_side.depth.octree.eigen import principal_axes
+from robot_side.depth.octree.patch_columns import PatchColumns
+from robot_side.depth.surfel_map.surfel_columns import SurfelColumns
 
 _ROOT3: Final = math.sqrt(3.0)
 """Half a uniform distribution's width, in its standard deviations"""

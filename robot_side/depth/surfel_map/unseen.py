@@ -13,11 +13,11 @@ from common.arrays import FloatArray, IntArray
 from robot_side.compiled.columns import BUNDLE
 from robot_side.compiled.kernel import FLOAT64, building_block, compiled, input_array, input_indices, output_indices
 from robot_side.compiled.vectors import load
-from robot_side.depth.collecting import SLOTS
 from robot_side.depth.grid import block_of
-from robot_side.depth.merging import DIRTY
 from robot_side.depth.picture import DepthArray, LabelArray
-from robot_side.depth.surfel_columns import Count, surfels_at
+from robot_side.depth.surfel_map.collecting import SLOTS
+from robot_side.depth.surfel_map.merging import DIRTY
+from robot_side.depth.surfel_map.surfel_columns import Count, surfels_at
 from robot_side.depth.view import LEAST, MASK, MOST, PICTURE, pixel_of, pixels_across, sd_at, to_camera
 
 _SIGMAS: Final = 3.0

@@ -8,8 +8,8 @@ import numpy as np
 from common.arrays import IntArray
 from robot_side.compiled.kernel import building_block
 from robot_side.compiled.vectors import Vector, add, dot, load, scale, subtract
-from robot_side.depth.coplanar import axis_of
-from robot_side.depth.patch_columns import BoxColumns, BoxCount, PatchColumns
+from robot_side.depth.octree.coplanar import axis_of
+from robot_side.depth.octree.patch_columns import BoxColumns, BoxCount, PatchColumns
 
 _SIDEWAYS: Final = 0.4
 """Cells by which an edge may differ"""

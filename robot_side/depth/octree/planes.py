@@ -8,13 +8,11 @@ from common.arrays import FloatArray, IntArray
 from robot_side.compiled.columns import BUNDLE
 from robot_side.compiled.kernel import INT64, building_block, compiled, input_array, input_indices, output_indices
 from robot_side.depth.boxes import Boxes
-from robot_side.depth.collecting import SLOTS
-from robot_side.depth.coplanar import absorb, merge_coplanar
 from robot_side.depth.grid import LEVELS, Grid
-from robot_side.depth.keeping import keep_or_write
-from robot_side.depth.merging import DIRTY
-from robot_side.depth.partition import NODES, divide
-from robot_side.depth.patch_columns import (
+from robot_side.depth.octree.coplanar import absorb, merge_coplanar
+from robot_side.depth.octree.keeping import keep_or_write
+from robot_side.depth.octree.partition import NODES, divide
+from robot_side.depth.octree.patch_columns import (
     BOXES,
     PATCHES,
     BoxColumns,
@@ -25,8 +23,10 @@ from robot_side.depth.patch_columns import (
     patch_columns,
     patches_at,
 )
-from robot_side.depth.surfel_columns import SurfelColumns, surfels_at
-from robot_side.depth.surfels import SurfelMap
+from robot_side.depth.surfel_map.collecting import SLOTS
+from robot_side.depth.surfel_map.merging import DIRTY
+from robot_side.depth.surfel_map.surfel_columns import SurfelColumns, surfels_at
+from robot_side.depth.surfel_map.surfels import SurfelMap
 
 _SIDE: Final = 1 << LEVELS
 _ROOM: Final = 50_000

@@ -10,7 +10,7 @@ from robot_side.compiled.kernel import array_of, building_block, compiled, input
 from robot_side.compiled.vectors import Vector, add, dot, load, norm, scale, subtract
 from robot_side.depth.grid import cell_at
 from robot_side.depth.picture import DepthArray, LabelArray
-from robot_side.depth.surfel_columns import Count, SurfelColumns, surfels_at
+from robot_side.depth.surfel_map.surfel_columns import Count, SurfelColumns, surfels_at
 from robot_side.depth.view import DIRECTIONS, MASK, PICTURE, ray_at, sd_at, to_world, turned_to_world
 
 _SIGMAS: Final = 3.0

@@ -7,9 +7,9 @@ import numpy as np
 
 from robot_side.compiled.kernel import building_block, inlined
 from robot_side.compiled.vectors import Vector, add, dot, load, scale, subtract
-from robot_side.depth.partition import LENIENCE
-from robot_side.depth.patch_columns import PatchColumns
-from robot_side.depth.plane_fit import along, choose_normal, measure_rise, normal_of
+from robot_side.depth.octree.partition import LENIENCE
+from robot_side.depth.octree.patch_columns import PatchColumns
+from robot_side.depth.octree.plane_fit import along, choose_normal, measure_rise, normal_of
 
 _ALIKE: Final = 0.9
 """Least product of the normals of two patches that may be one"""

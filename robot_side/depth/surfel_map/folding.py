@@ -8,9 +8,9 @@ from common.arrays import FloatArray, IntArray
 from robot_side.compiled.columns import BUNDLE
 from robot_side.compiled.kernel import building_block, compiled, input_array, input_indices, output_indices
 from robot_side.compiled.vectors import Vector, add, dot, load, norm, scale, subtract, unit
-from robot_side.depth.collecting import FURTHEST, SLOTS
 from robot_side.depth.grid import cell_at
-from robot_side.depth.surfel_columns import Count, SurfelColumns, surfels_at
+from robot_side.depth.surfel_map.collecting import FURTHEST, SLOTS
+from robot_side.depth.surfel_map.surfel_columns import Count, SurfelColumns, surfels_at
 from robot_side.depth.view import camera_position, pixels_across, sd_at, turned_to_world
 
 _SIGMAS: Final = 3.0

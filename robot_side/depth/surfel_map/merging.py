@@ -16,9 +16,9 @@ from robot_side.compiled.kernel import (
     output_indices,
 )
 from robot_side.compiled.vectors import Vector, dot, load, norm, scale, subtract, unit
-from robot_side.depth.folding import mean_normal, mean_point
 from robot_side.depth.grid import block_of
-from robot_side.depth.surfel_columns import Count, SurfelColumns, surfels_at
+from robot_side.depth.surfel_map.folding import mean_normal, mean_point
+from robot_side.depth.surfel_map.surfel_columns import Count, SurfelColumns, surfels_at
 from robot_side.depth.view import camera_position, sd_at
 
 _SIGMAS: Final = 3.0
