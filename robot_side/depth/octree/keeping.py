@@ -16,6 +16,8 @@ _SIDEWAYS: Final = 0.4
 _AHEAD_M: Final = 0.0003
 _AHEAD: Final = 0.5
 """Distance by which a corner of the front may differ: in m, and in standard deviations of a pixel"""
+_NEARER: Final = 0.8
+"""Share of a box's error below which it is written anew"""
 _THICK: Final = 2.0
 """Cells of which a box is thick, unless it is narrower"""
 _LEAST_M: Final = 0.0005
@@ -71,7 +73,7 @@ def _is_near(
     edge: float,
 ) -> bool:
     """Return whether the front of a patch is where that of the box is, with the same role."""
-    if boxes.roles[row] != patches.roles[patch]:
+    if boxes.roles[row] != patches.roles[patch] or patches.sds_m[patch] < _NEARER * boxes.sds_m[row]:
         return False
     axes = boxes.axes
     u = axes[row, 0], axes[row, 1], axes[row, 2]

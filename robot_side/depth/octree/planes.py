@@ -130,6 +130,7 @@ def _gather(surfels: SurfelColumns, slot: np.ndarray, cells: IntArray, block: in
                     count += 1
                     for axis in range(3):
                         surfels.looked_m[row, axis] = surfels.points_m[row, axis]
+                    surfels.looked_m[row, 3] = surfels.sds_m[row]
     return count
 
 

@@ -30,6 +30,8 @@ MOST_EVIDENCE: Final = 3
 """Pictures against it after which a surfel is gone, at most"""
 _ASTRAY: Final = 3
 """Successive pictures that put a surfel elsewhere after which it is there"""
+_NEARER: Final = 0.7
+"""Share of a surfel's error below which it is looked at again, as it was seen from nearer"""
 _SETTLED: Final = 4.0
 """Number of pictures that a mean is worth when its surface is looked at again"""
 _NOISE: Final = 0.6
@@ -115,6 +117,7 @@ def merge(
             away_from = subtract(load(surfels.points_m, row), load(surfels.looked_m, row))
             along = abs(dot(away_from, unit(load(surfels.normals, row))))
             changed = changed or along > _MOVED_M + surfels.sds_m[row] or norm(away_from) > 0.4 * edge
+            changed = changed or surfels.sds_m[row] < _NEARER * surfels.looked_m[row, 3]
             # Its first mean is rough.
             changed = changed or weight < _SETTLED <= surfels.weights[row]
         if changed and surfels.shown[row]:

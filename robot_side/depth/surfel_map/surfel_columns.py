@@ -21,7 +21,7 @@ class SurfelColumns(NamedTuple):
     spreads_m2: FloatArray
     """(n, 6) covariance of its pixels' points: xx, yy, zz, xy, xz, yz"""
     looked_m: FloatArray
-    """(n, 3) its point when surfaces were last looked for"""
+    """(n, 4) its point when surfaces were last looked for, and its standard deviation then"""
     noise_m2: FloatArray
     """(n,) variance that noise adds along a view"""
     weights: FloatArray
@@ -56,7 +56,7 @@ class SurfelColumns(NamedTuple):
 
 SURFELS: Final = Declared(
     SurfelColumns,
-    *(rows(3), rows(3), rows(6), rows(3)),
+    *(rows(3), rows(3), rows(6), rows(4)),
     *(NUMBERS,) * 4,
     *(INDICES,) * 6,
     rows(SUMS),
