@@ -47,7 +47,8 @@ def cell_at(place: FloatArray, cells: IntArray, a: Vector) -> int:
     k = math.floor((a[2] - place[2]) * place[4])
     if i < 0 or j < 0 or k < 0 or i >= cells[0] or j >= cells[1] or k >= cells[2]:
         return -1
-    return (i * cells[1] + j) * cells[2] + k
+    cell: int = (i * cells[1] + j) * cells[2] + k
+    return cell
 
 
 @inlined
@@ -61,4 +62,5 @@ def block_of(cells: IntArray, cell: int) -> int:
     """Return the number of the block that holds a cell."""
     i, j, k = indices_of(cells, cell)
     across, up = ((cells[1] - 1) >> LEVELS) + 1, ((cells[2] - 1) >> LEVELS) + 1
-    return ((i >> LEVELS) * across + (j >> LEVELS)) * up + (k >> LEVELS)
+    block: int = ((i >> LEVELS) * across + (j >> LEVELS)) * up + (k >> LEVELS)
+    return block

@@ -40,7 +40,8 @@ def view_of(pinhole: Pinhole, pose: CameraPose, errors: DepthErrors) -> FloatArr
 @inlined
 def sd_at(view: FloatArray, depth_m: float) -> float:
     """Return the standard deviation in m of a pixel at this depth."""
-    return view[_FLOOR] + view[_GROWTH] * depth_m * depth_m
+    sd_m: float = view[_FLOOR] + view[_GROWTH] * depth_m * depth_m
+    return sd_m
 
 
 @inlined
@@ -92,4 +93,5 @@ def camera_position(view: FloatArray) -> Vector:
 @inlined
 def pixels_across(view: FloatArray, length_m: float, depth_m: float) -> float:
     """Return how many pixels a length square to the view has at a depth."""
-    return view[0] * length_m / depth_m
+    pixels: float = view[0] * length_m / depth_m
+    return pixels

@@ -29,7 +29,7 @@ def keep_or_write(
     patches: PatchColumns, patch: int, boxes: BoxColumns, box_of: np.ndarray, node: int, edge: float, counts: IntArray
 ) -> int:
     """Let the node's box stay, or make it that of the patch; return its row, -1 without room."""
-    row = box_of[node]
+    row: int = box_of[node]
     a = max(0.5 * (patches.highs_m[patch, 0] - patches.lows_m[patch, 0]), _LEAST_M)
     b = max(0.5 * (patches.highs_m[patch, 1] - patches.lows_m[patch, 1]), _LEAST_M)
     half = 0.5 * min(_THICK * edge, max(2.0 * min(a, b), 0.5 * edge))
@@ -94,4 +94,5 @@ def _is_near(
     aside = max(abs(far_u - a), abs(low_u + a), abs(far_v - b), abs(low_v + b))
     # Many surfels together know their plane better.
     share = min(1.0, 2.0 / math.sqrt(patches.counts[patch]))
-    return aside <= _SIDEWAYS * edge and off <= _AHEAD_M + _AHEAD * share * boxes.sds_m[row]
+    near: bool = aside <= _SIDEWAYS * edge and off <= _AHEAD_M + _AHEAD * share * boxes.sds_m[row]
+    return near

@@ -26,7 +26,8 @@ def _node(cells: IntArray, cell: int, level: int) -> int:
     i, j, k = indices_of(cells, cell)
     mask, across = (1 << LEVELS) - 1, LEVELS - level
     place = ((((i & mask) >> level) << across) + ((j & mask) >> level) << across) + ((k & mask) >> level)
-    return (8**across - 1) // 7 + place
+    node: int = (8**across - 1) // 7 + place
+    return node
 
 
 @inlined

@@ -36,12 +36,13 @@ _new_matrix, _new_axes = on_stack(3, 3), on_stack(3, 3)
 @inlined
 def along(six: FloatArray, row: int, a: Vector) -> float:
     """Return the variance along a unit vector of the covariance in a row (xx, yy, zz, xy, xz, yz)."""
-    return (
+    variance: float = (
         six[row, 0] * a[0] * a[0]
         + six[row, 1] * a[1] * a[1]
         + six[row, 2] * a[2] * a[2]
         + 2.0 * (six[row, 3] * a[0] * a[1] + six[row, 4] * a[0] * a[2] + six[row, 5] * a[1] * a[2])
     )
+    return variance
 
 
 @building_block
@@ -220,4 +221,5 @@ def is_filled(
             for j in range(max(lowest, 0), min(top, up - 1) + 1):
                 empty -= raster[i, j] == 0
                 raster[i, j] = 1
-    return empty * 30.0 <= lenience * across * up
+    filled: bool = empty * 30.0 <= lenience * across * up
+    return filled

@@ -38,7 +38,7 @@ def _beside(
     for half in range(2, 2 * min(int(near / edge + 0.5), FURTHEST) + 4):
         step = (0.25 if half % 2 else -0.25) * (half // 2 * 2)
         cell = cell_at(place, cells, add(point, scale(step * edge, ray)))
-        row = slot[cell] if cell >= 0 else -1
+        row: int = slot[cell] if cell >= 0 else -1
         if row >= 0 and surfels.weights[row] > 0.0:
             normal, away = load(surfels.normals, row), subtract(point, load(surfels.points_m, row))
             # The error is along the ray, so that a grazed surface shows less of it.

@@ -1,3 +1,5 @@
+from typing import Any
+
 import pytest
 
 from robot_side.depth.settings import MapSettings
@@ -15,7 +17,7 @@ from robot_side.depth.settings import MapSettings
         ({"upper_m": (20.0, 20.0, 20.0)}, "cell_m = 0.01 makes"),
     ],
 )
-def test_settings_out_of_range_are_refused(changed: dict[str, float], complaint: str) -> None:
+def test_settings_out_of_range_are_refused(changed: dict[str, Any], complaint: str) -> None:
     with pytest.raises(ValueError, match=complaint):
         MapSettings(**changed)
 
