@@ -53,7 +53,7 @@ def _new_surfel(surfels: SurfelColumns, slot: np.ndarray, cell: int, counts: Int
     """Return the row of a new surfel in a cell; -1 without room."""
     if counts[Count.FREE] > 0:
         counts[Count.FREE] -= 1
-        row = surfels.free[counts[Count.FREE]]
+        row: int = surfels.free[counts[Count.FREE]]
     elif counts[Count.TOP] < surfels.cells.size:
         row = counts[Count.TOP]
         counts[Count.TOP] += 1
