@@ -92,7 +92,7 @@ def settings_of(content: Mapping[str, Any], settings_type: type[Settings], place
 
     Nested settings may be mappings or instances.
     """
-    content = _in_tables(content, settings_type)
+    content = _in_tables(content, settings_type, place)
     _refuse_unknown_keys(content, settings_type, place, "", elsewhere)
     try:
         return msgspec.convert(content, settings_type, dec_hook=_from_toml)
@@ -133,16 +133,20 @@ def run_command(program: str, command: Callable[[Sequence[str]], int]) -> None:
     sys.exit(code)
 
 
-def _in_tables(content: Mapping[str, Any], settings_type: type) -> Mapping[str, Any]:
+def _in_tables(content: Mapping[str, Any], settings_type: type, place: str) -> Mapping[str, Any]:
     """Return the content with the keys of a table `[name]` as fields `name_key`, if the field `name` is an address.
 
-    So `[arm] address = "…"` is the field `arm`, and `[arm.limits]` is `arm_limits`.
+    So `[arm] address = "…"` is the field `arm`, and `[arm.limits]` is `arm_limits`. ConfigurationError for both.
     """
     hints, found = get_type_hints(settings_type), dict(content)
     for name, table in content.items():
         if isinstance(table, Mapping) and hints.get(name) == (str | None):
             del found[name]
-            found |= {name if key == "address" else f"{name}_{key}": value for key, value in table.items()}
+            fields = {name if key == "address" else f"{name}_{key}": value for key, value in table.items()}
+            for field in fields.keys() & found.keys():
+                key = field.removeprefix(f"{name}_")
+                raise ConfigurationError(f"{place}: {field} and {name}.{key} are both given; valid: one of them")
+            found |= fields
     return found
 
 

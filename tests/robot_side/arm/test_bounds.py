@@ -157,6 +157,7 @@ def test_the_table_of_the_arm_is_read(tmp_path: Path) -> None:
         ("[arm]\nfastest_m_s = 0", "fastest_m_s"),
         ("[arm.limits]\nvelocity_rad_s = [1.0, 0.0]", "velocity_rad_s"),
         ("[arm]\nspeed = 1", "arm_speed"),
+        ("[arm_limits]\nlatency_s = 0.1\n[arm.limits]\nlatency_s = 0.2", "arm_limits and arm.limits are both given"),
     ],
 )
 def test_a_wrong_table_is_told_by_its_key(tmp_path: Path, table: str, says: str) -> None:
