@@ -125,8 +125,9 @@ class FrameUnpacker:
             arrays["unseen_m"], arrays["late_s"] = _UNSEEN.unpack_from(content, position)
             position += _UNSEEN.size
         if flags & _HAS_SURFACES:
-            before = None if last is None else last.surfaces
-            arrays["surfaces"], position = _unpacked(content, position, np.int64, (), before)
+            arrays["surfaces"], position = _unpacked(
+                content, position, np.int64, (), None if last is None else last.surfaces
+            )
         library = None if last is None else last.mesh_library
         if flags & _HAS_MESHES:
             sources, position = _content(content, position, tuple[tuple[bytes, bytes], ...])

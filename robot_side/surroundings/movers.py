@@ -65,7 +65,7 @@ class Movers:
         """(n,) indices of the movers' primitives among all primitives of the frame"""
         self.first_rows = np.searchsorted(owners[self._own], np.append(things, len(first.names)))
         self.parts = self._all_parts(kinds[self._own], rows_of_kind[self._own])
-        made_whole = {*self.parts, "time_s", "roles", "since", "unseen_m", "late_s", "surfaces"}
+        made_whole = {*self.parts, "time_s", "roles", "since", "unseen_m", "late_s", "sds_m", "surfaces"}
         self._still = {name: value for name, value in vars(first).items() if name not in made_whole}
 
     def _all_parts(self, kinds: IntArray, rows_of_kind: IntArray) -> Mapping[str, Part]:
@@ -116,11 +116,13 @@ class Movers:
         roles: tuple[Role, ...],
         unseen_m: float = 0.0,
         late_s: float = 0.0,
+        sds_m: FloatArray | None = None,
         surfaces: IntArray | None = None,
     ) -> PerceivedObjects:
         """Return a new frame: the movers have these numbers (n + m, 20), all other objects are as in the first frame.
 
-        roles: of all objects. unseen_m, late_s: as in a frame. surfaces: of all objects; None: as in the first frame.
+        roles: of all objects. unseen_m, late_s: as in a frame. sds_m, surfaces: of all objects; None: as in the first
+        frame.
         ValueError for numbers of another shape or type, or for another number of roles or of surfaces.
         """
         shape = len(self._own) + len(self.things), NUMBERS
@@ -131,8 +133,9 @@ class Movers:
             )
         if len(roles) != len(self.first.names):
             raise ValueError(f"roles holds {len(roles)} roles; valid: one for each of {len(self.first.names)} objects")
-        surfaces = self.first.surfaces if surfaces is None else surfaces
-        said = {"time_s": time_s, "roles": roles, "unseen_m": unseen_m, "late_s": late_s, "surfaces": surfaces}
+        said = {"time_s": time_s, "roles": roles, "unseen_m": unseen_m, "late_s": late_s}
+        said["sds_m"] = self.first.sds_m if sds_m is None else sds_m
+        said["surfaces"] = self.first.surfaces if surfaces is None else surfaces
         return _MoversFrame(**self._still, **said, since=(self, numbers))
 
 

@@ -6,7 +6,7 @@ from common.arrays import FloatArray
 from common.roles import Role
 from robot_side.surroundings.perceived import ObjectSource, PerceivedObjects
 from robot_side.surroundings.scene_table import SceneTable, go_to, make
-from robot_side.surroundings.target import center_m, next_target, object_centers
+from robot_side.surroundings.target import center_m, extent_middle_m, next_target, object_centers
 from robot_side.surroundings.validity import require_valid
 
 _KEPT: Final = 8
@@ -49,8 +49,12 @@ class Surroundings:
         return self._target[1]
 
     def center_m(self, frame: PerceivedObjects, index: int) -> FloatArray:
-        """Return the centre (3,) of one object of a frame; see `target.center_m`."""
-        return center_m(self.see(frame), index)
+        """Return the centre (3,) of one object of a frame; see `target.center_m`.
+
+        Where surfaces are perceived, an object is only a shell of some of its sides: its extent's middle counts.
+        """
+        table = self.see(frame)
+        return center_m(table, index) if frame.surfaces is None else extent_middle_m(frame, index)
 
     def _keep(self, frame: PerceivedObjects, table: SceneTable) -> SceneTable:
         self._tables[id(frame)] = table

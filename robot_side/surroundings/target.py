@@ -29,6 +29,15 @@ def center_m(table: SceneTable, thing: int) -> FloatArray:
     return center
 
 
+def extent_middle_m(objects: PerceivedObjects, thing: int) -> FloatArray:
+    """Return the middle (3,) of the extent, along the world's axes, of an object of boxes, in m."""
+    mine = objects.box_object == thing
+    reach_m = np.einsum("bij,bj->bi", np.abs(objects.box_rotations[mine]), objects.box_half_sizes_m[mine])
+    centers_m = objects.box_centers_m[mine]
+    middle_m: FloatArray = 0.5 * ((centers_m - reach_m).min(axis=0) + (centers_m + reach_m).max(axis=0))
+    return middle_m
+
+
 def _centers(shapes: FloatArray, kinds: IntArray, owners: IntArray, count: int) -> FloatArray:
     """Return the centres (count, 3) of objects; owners (n,): each primitive's object."""
     points, four = shapes[:, :3], kinds == TETRAHEDRON

@@ -2,38 +2,18 @@
 
 import math
 from dataclasses import dataclass
-from typing import Annotated, Final, Protocol
+from typing import Protocol
 
 import numpy as np
-from msgspec import Meta
-from scipy.spatial.transform import Rotation
 
-from common.limits import check_limits, check_value
+from common.limits import check_limits
 from common.protocol.view_messages import Eye
-
-_Coordinate = Annotated[float, Meta(ge=-100.0, le=100.0)]
-_UNIT: Final = 0.01
-"""Largest deviation of a quaternion's length from 1 that is accepted"""
-
-
-@dataclass(frozen=True)
-class Mount:
-    """Pose of a camera: in the tool's frame for the first-person view, in the world's for the overview."""
-
-    position_m: tuple[float, float, float]
-    quaternion: tuple[float, float, float, float]
-    """From the camera's frame, whose x is right, y down and z ahead in its picture; w first."""
-
-    def __post_init__(self) -> None:
-        for value in self.position_m:
-            check_value("position_m", value, _Coordinate)
-        if not abs(math.hypot(*self.quaternion) - 1.0) <= _UNIT:
-            raise ValueError(f"quaternion = {self.quaternion}; valid: a quaternion of length 1, w first")
+from robot_side.surroundings.mount import Mount
 
 
 @dataclass(frozen=True)
 class MountSettings:
-    """Mounts of the cameras whose pictures are sent."""
+    """Mounts of cameras whose pictures are sent: on the tool for the first-person view, else in the world."""
 
     first_person: Mount | None = None
     overview: Mount | None = None
@@ -68,7 +48,7 @@ class Pinhole(Protocol):
 
 def mounted_eye(mount: Mount, pinhole: Pinhole, width: int, height: int) -> Eye:
     """Return the viewpoint of a camera with this mount, whose pictures have `width` x `height` pixels."""
-    axes = Rotation.from_quat(mount.quaternion, scalar_first=True).as_matrix()
+    axes = mount.axes()
     half = 0.5 * height
     return Eye(
         position_m=mount.position_m,

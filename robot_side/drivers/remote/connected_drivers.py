@@ -1,14 +1,16 @@
-"""Ports of the settings --arm, --objects and --pictures, and the wait for the first messages over these."""
+"""Ports of the settings --arm, --objects, --pictures and --depth, and the wait for the first messages over these."""
 
 from collections.abc import Callable
-from typing import Any, Final
+from typing import Any, Final, Protocol
 
 from common.roles import Role
 from common.sockets.door.client import Door
 from common.sockets.door.messages import DriverSettings
 from robot_side.arm.limits import ArmLimits
 from robot_side.arm.port import ArmState
+from robot_side.depth.camera_settings import DEPTH_PORT
 from robot_side.drivers.remote.arm import RemoteArm
+from robot_side.drivers.remote.depth_message import DEPTH_LIMIT_BYTES
 from robot_side.drivers.remote.driver_session import ArmShape
 from robot_side.drivers.remote.frame_message import FRAME_LIMIT_BYTES
 from robot_side.drivers.remote.messages import STATE_LIMIT_BYTES
@@ -23,10 +25,14 @@ _FRAMES_BYTES_PER_S: Final = 16e6
 """Budgets of a driver's states, 1000 a second, and of a perception, whose usual frames have some kilobytes"""
 _PICTURES_BYTES_PER_S: Final = 16e6
 """Budget of a camera process: JPEG, or one view of 640 x 480 in rgb8 at 15 Hz"""
+_DEPTH_BYTES_PER_S: Final = 64e6
+"""Budget of a depth camera's process: 848 x 480 pixels with labels at 30 Hz, and some more"""
 _AWAITED: Final = {"--arm": "an arm's driver", "--objects": "a process that perceives objects"}
 
 
-def driver_ports(arm: str | None, objects: str | None, pictures: str | None = None) -> dict[str, DriverSettings]:
+def driver_ports(
+    arm: str | None, objects: str | None, pictures: str | None = None, depth: str | None = None
+) -> dict[str, DriverSettings]:
     """Return the settings of the ports at which programs connect, keyed by flag."""
     found: dict[str, DriverSettings] = {}
     if arm is not None:
@@ -36,7 +42,17 @@ def driver_ports(arm: str | None, objects: str | None, pictures: str | None = No
     if pictures is not None:
         limits = PICTURE_LIMIT_BYTES, _PICTURES_BYTES_PER_S
         found["--pictures"] = DriverSettings(pictures, "perception", *limits, on_request=True)
+    if depth is not None:
+        found[DEPTH_PORT] = DriverSettings(depth, "perception", DEPTH_LIMIT_BYTES, _DEPTH_BYTES_PER_S)
     return found
+
+
+class Summarized(Protocol):
+    """Source with figures of its own."""
+
+    def summary(self) -> dict[str, Any]:
+        """Return the figures."""
+        ...
 
 
 class ConnectedDrivers:
@@ -50,6 +66,8 @@ class ConnectedDrivers:
         port = self._ports.get("--pictures")
         self.pictures = None if port is None else RemotePictures(port, note)
         """Source of the pictures that are sent to --pictures; None without it"""
+        self.surfaces: Summarized | None = None
+        """Source of what depth cameras see; None without any"""
 
     @property
     def has_arm(self) -> bool:
@@ -106,4 +124,5 @@ class ConnectedDrivers:
             "arm": arm,
             "objects": None if self._objects is None else self._objects.summary(),
             "pictures": None if self.pictures is None else self.pictures.senders.summary(),
+            "depth": None if self.surfaces is None else self.surfaces.summary(),
         }

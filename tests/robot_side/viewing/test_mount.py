@@ -11,7 +11,8 @@ from common.errors import ConfigurationError
 from operator_side.viewing.console.outlines import seen
 from robot_side.drivers.remote.picture_message import Intrinsics
 from robot_side.settings import RobotSettings
-from robot_side.viewing.mount import Mount, mounted_eye
+from robot_side.surroundings.mount import Mount
+from robot_side.viewing.mount import mounted_eye
 
 WIDTH, HEIGHT = 320, 240
 

@@ -9,8 +9,9 @@ import pytest
 from common.protocol.view_messages import ViewName
 from robot_side.drivers.mujoco.scene import Scene, load_scene
 from robot_side.drivers.remote.picture_message import Intrinsics
+from robot_side.surroundings.mount import Mount
 from robot_side.viewing.exchange import Ready, Sent, Undecodable
-from robot_side.viewing.mount import Mount, MountSettings
+from robot_side.viewing.mount import MountSettings
 from robot_side.viewing.settings import CamerasSettings
 from tests.helpers.fake_companion import Desk
 from tests.robot_side.viewing.view_table import TABLES, Table

@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from robot_side.drivers.remote.frame_age import MOST_CARRIED_S, MOST_GROWN_S, since
 from robot_side.drivers.remote.objects import RemoteObjects
 from robot_side.drivers.remote.sender_clock import UNBOUNDED_S
+from robot_side.surroundings.age import MOST_CARRIED_S, MOST_GROWN_S, since
 from robot_side.surroundings.perceived import PerceivedObjects
 from robot_side.surroundings.surroundings import Surroundings
 
