@@ -1,19 +1,25 @@
 """The map: pictures of depth cameras in, boxes behind the surfaces out."""
 
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
+from common.arrays import IntArray
+from common.roles import ROLES, Role
 from robot_side.depth.boxes import Boxes
 from robot_side.depth.free_space import SeenSpace
 from robot_side.depth.grid import Grid
 from robot_side.depth.octree.planes import Planes
 from robot_side.depth.own_body import own_pixels
 from robot_side.depth.picture import CameraPose, DepthErrors, DepthPicture, OwnBody
+from robot_side.depth.pointing import patch_around
 from robot_side.depth.settings import MapSettings
 from robot_side.depth.support import normals, supported
 from robot_side.depth.surfel_map.surfels import SurfelMap
 from robot_side.depth.view import view_of
+
+NO_ROLE: Final = -1
 
 
 @dataclass(frozen=True)
@@ -81,3 +87,20 @@ class DepthMap:
     def boxes(self) -> Boxes:
         """Return the boxes behind all surfaces that have been in two pictures."""
         return self.planes.boxes()
+
+    def mark(self, box: int, role: Role) -> None:
+        """Give a role to the patch of surface at the box of this number, as far as the gripper may grasp it."""
+        boxes = self.planes.boxes()
+        found = np.flatnonzero(boxes.ids == box)
+        if found.size:
+            rows = patch_around(boxes, int(found[0]), self.surfels, self.settings.cell_m)
+            self._give(rows, role)
+
+    def unmark(self, role: Role) -> None:
+        """Take the role from all surfaces that have it."""
+        rows = self.surfels.shown
+        self._give(rows[self.surfels.table.roles[rows] == ROLES.index(role)], Role.OBSTACLE)
+
+    def _give(self, rows: IntArray, role: Role) -> None:
+        self.surfels.table.roles[rows] = NO_ROLE if role is Role.OBSTACLE else ROLES.index(role)
+        self.surfels.look_again(rows)

@@ -63,6 +63,8 @@ class DepthErrors:
     floor_m: float = 0.0
     least_m: float = 0.17
     most_m: float = 3.0
+    correlation: float = 0.0
+    """Angle in rad at which the correlation of two pixels' errors falls to 1/e: their distance over the focal length"""
 
     def sd_m(self, depth_m: float) -> float:
         """Return the standard deviation in m of one pixel at `depth_m`."""

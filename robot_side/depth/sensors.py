@@ -48,7 +48,8 @@ class SensorErrors:
         """Return what a map has to assume of a camera with `level` times these errors."""
         # Rounding errs evenly within a step.
         growth_per_m = level * math.hypot(self.growth_per_m, self.step_per_m / math.sqrt(12.0))
-        return DepthErrors(growth_per_m, level * self.floor_m, self.least_m, self.most_m)
+        correlation = self.correlation_px / self.focal_px
+        return DepthErrors(growth_per_m, level * self.floor_m, self.least_m, self.most_m, correlation)
 
 
 SENSORS: Final[Mapping[str, SensorErrors]] = MappingProxyType(

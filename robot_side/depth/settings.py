@@ -26,8 +26,6 @@ class MapSettings(Limited):
     """Distance from the robot's own solids within which a measured point is the robot's own"""
     slots: Annotated[int, Meta(ge=64, le=16384)] = 2048
     """Largest number of surfaces that are handed on"""
-    unknown: Annotated[float, Meta(ge=0.0, le=0.5)] = 0.0
-    """Share of full strength that space gets which nobody has seen; 0: it is free."""
 
     def __post_init__(self) -> None:
         super().__post_init__()

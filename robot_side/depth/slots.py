@@ -1,6 +1,7 @@
 """A fixed pool of objects for the map's boxes, of which only the changes are handed on.
 
-Each slot is an object `surface 0` to `surface n - 1` of one box. Unused slots are parked far away, with volume: a box
+The first slots are pieces of one object, `target`; each other one is an object of one box, `surface 1` to `surface n`.
+Unused slots are parked far away, with volume: a box
 without volume would make a scene's table be built anew. The process of the map calls `update`, that of the law `apply`.
 """
 
@@ -9,9 +10,12 @@ from typing import Final
 
 import numpy as np
 
-from common.arrays import FloatArray, IntArray, require_finite
+from common.arrays import BoolArray, FloatArray, IntArray, require_finite
 from common.roles import ROLES, Role
 from robot_side.depth.boxes import Boxes
+from robot_side.depth.picture import DepthErrors
+from robot_side.depth.surface_errors import surface_sds
+from robot_side.depth.together import largest_piece, planes_of
 from robot_side.surroundings.kinds.layout import NUMBERS
 from robot_side.surroundings.movers import Movers
 from robot_side.surroundings.perceived import PerceivedObjects
@@ -19,6 +23,12 @@ from robot_side.surroundings.perceived import PerceivedObjects
 _PARKED_M: Final = -1000.0
 """Height of unused slots"""
 _PARKED_HALF_M: Final = 0.005
+_SPECK_HALF_M: Final = 0.0005
+TARGET_NAME: Final = "target"
+EXACT: Final = DepthErrors(growth_per_m=0.0)
+PIECES: Final = 96
+"""Number of boxes of which the target consists at most"""
+_TARGET, _IGNORED = ROLES.index(Role.TARGET), ROLES.index(Role.IGNORED)
 _SIZES: Final = slice(12, 15)
 BOX_NUMBERS: Final = 15
 """Centre (3), rotation by rows (9) and half sizes (3)"""
@@ -35,7 +45,9 @@ class SlotChanges:
     roles: IntArray
     """(c,) indices in ROLES"""
     sds_m: FloatArray
-    """(c,) standard deviation of a pixel that made the surface; 0 for unused slots"""
+    """(c,) standard deviation of the surface's place by its pixels' errors; 0 for unused slots"""
+    planes: IntArray
+    """(c,) number of the plane of which the box is a piece: that of its first object; -1 for a box that stands alone"""
     crowded_out: int
     """Boxes for which there was no slot: those furthest from the gripper"""
 
@@ -44,15 +56,19 @@ class Slots:
     """Pool of slots."""
 
     def __init__(self, count: int) -> None:
-        """count: number of slots."""
-        none = np.empty(0, dtype=np.int64)
-        self._numbers, self._roles, self.sds_m = _unused(count)
-        """(n,) standard deviation of a pixel that made each slot's surface; 0 for unused slots"""
-        self._ids: IntArray = np.full(count, -1)
-        self._frame_roles: tuple[Role, ...] = (Role.OBSTACLE,) * count
+        """count: number of slots that are objects of their own."""
+        none, rows = np.empty(0, dtype=np.int64), PIECES + count
+        self._numbers, self._roles, self.sds_m = _unused(rows)
+        """(n,) standard deviation of each slot's place by its pixels' errors; 0 for unused slots"""
+        self._ids: IntArray = np.full(rows, -1)
+        self._planes: IntArray = np.full(rows, -1)
+        self._frame_roles: tuple[Role, ...] = (Role.OBSTACLE,) * (1 + count)
+        self._objects = np.concatenate([np.zeros(PIECES, dtype=np.int64), np.arange(1, 1 + count)])
+        """(n,) index of each slot's object"""
+        placed = self._numbers[PIECES - 1 :]
         first = PerceivedObjects(
             time_s=0.0,
-            names=tuple(f"surface {number}" for number in range(count)),
+            names=(TARGET_NAME, *(f"surface {number}" for number in range(1, 1 + count))),
             roles=self._frame_roles,
             sphere_centers_m=np.empty((0, 3)),
             sphere_radii_m=np.empty(0),
@@ -60,62 +76,76 @@ class Slots:
             box_centers_m=self._numbers[:, :3].copy(),
             box_rotations=self._numbers[:, 3:12].reshape(-1, 3, 3).copy(),
             box_half_sizes_m=self._numbers[:, _SIZES].copy(),
-            box_object=np.arange(count),
+            box_object=self._objects,
             tetrahedron_vertices_m=np.empty((0, 4, 3)),
             tetrahedron_object=none,
             half_space_normals=np.empty((0, 3)),
             half_space_offsets_m=np.empty(0),
             half_space_object=none,
-            positions_m=self._numbers[:, :3].copy(),
-            rotations=self._numbers[:, 3:12].reshape(-1, 3, 3).copy(),
-            velocities_m_s=np.zeros((count, 3)),
+            positions_m=placed[:, :3].copy(),
+            rotations=placed[:, 3:12].reshape(-1, 3, 3).copy(),
+            velocities_m_s=np.zeros((1 + count, 3)),
         )
-        self._movers = Movers(first, np.arange(count))
-        self._frame_numbers = np.zeros((2 * count, NUMBERS))
-        self._write(np.arange(count))
+        self._movers = Movers(first, np.arange(1 + count))
+        self._frame_numbers = np.zeros((rows + 1 + count, NUMBERS))
+        self._write(np.arange(rows))
 
     @property
     def first(self) -> PerceivedObjects:
         """Frame with all slots unused: the complete frame that each later one changes"""
         return self._movers.first
 
-    def update(self, boxes: Boxes, near_m: FloatArray) -> SlotChanges:
+    def box_of(self, name: str) -> int | None:
+        """Return the number of a box of the object `name`; None if it has none."""
+        held = self._ids[self._objects == self.first.names.index(name)] if name in self.first.names else self._ids[:0]
+        held = held[held >= 0]
+        return int(held[0]) if held.size else None
+
+    def update(self, boxes: Boxes, near_m: FloatArray, errors: DepthErrors = EXACT) -> SlotChanges:
         """Give each box a slot, which it keeps as long as it is there, and return what changed.
 
+        errors: of the cameras.
+
         near_m (3,): the gripper's place; if there are too many boxes, those nearest to it get slots. A box without a
-        role is an obstacle.
+        role is an obstacle; boxes of the target are its pieces; ignored ones get no slot.
         """
-        chosen = np.arange(len(boxes.ids))
-        if len(chosen) > len(self._ids):
-            chosen = np.sort(np.argsort(_distances(boxes, near_m), kind="stable")[: len(self._ids)])
-        ids = boxes.ids[chosen]
-        slots = np.flatnonzero(self._ids >= 0)
-        gone = slots[~np.isin(self._ids[slots], ids)]
-        self._ids[gone] = -1
-        new = np.flatnonzero(~np.isin(ids, self._ids))
-        # Boxes of neighbouring numbers are neighbours, and a scene's blocks are of neighbouring slots.
-        self._ids[np.flatnonzero(self._ids < 0)[: len(new)]] = ids[new]
-        used = np.flatnonzero(self._ids >= 0)
-        order = np.argsort(ids, kind="stable")
-        rows = chosen[order[np.searchsorted(ids[order], self._ids[used])]]
+        away_m = _distances(boxes, near_m)
+        is_piece, of_target = boxes.roles == _TARGET, np.flatnonzero(boxes.roles == _TARGET)
+        is_piece[of_target] = largest_piece(boxes, of_target)
+        groups = (np.flatnonzero(is_piece), np.flatnonzero(~is_piece & (boxes.roles != _IGNORED)))
+        of_planes = planes_of(boxes)
+        of_pixels_m = surface_sds(boxes, of_planes, errors)
         numbers, roles, sds_m = _unused(len(self._ids))
-        rotations = boxes.rotations[rows].reshape(len(rows), 9)
-        numbers[used] = np.concatenate([boxes.centers_m[rows], rotations, boxes.half_sizes_m[rows]], axis=1)
-        given = boxes.roles[rows]
-        roles[used] = np.where(given < 0, roles[used], given)
-        sds_m[used] = boxes.sds_m[rows]
+        planes: IntArray = np.full(len(self._ids), -1)
+        crowded_out = 0
+        for rows, those in zip((slice(0, PIECES), slice(PIECES, None)), groups, strict=True):
+            ids = self._ids[rows]
+            chosen = those if len(those) <= len(ids) else np.sort(those[np.argsort(away_m[those])[: len(ids)]])
+            crowded_out += len(those) - len(chosen)
+            _assign(ids, boxes.ids[chosen])
+            used = np.flatnonzero(ids >= 0)
+            order = np.argsort(boxes.ids[chosen], kind="stable")
+            of = chosen[order[np.searchsorted(boxes.ids[chosen][order], ids[used])]]
+            rotations = boxes.rotations[of].reshape(len(of), 9)
+            numbers[rows][used] = np.concatenate([boxes.centers_m[of], rotations, boxes.half_sizes_m[of]], axis=1)
+            given = boxes.roles[of]
+            is_none = (given < 0) | (~is_piece[of] & (given == _TARGET))
+            roles[rows][used] = np.where(is_none, roles[rows][used], given)
+            sds_m[rows][used] = of_pixels_m[of]
+            if rows.stop is None:
+                planes[rows][used] = _by_first(of_planes[of], self._objects[rows][used])
+        _fill_pieces(numbers[:PIECES], self._ids[:PIECES] >= 0)
         same = (numbers == self._numbers).all(axis=1) & (roles == self._roles) & (sds_m == self.sds_m)
-        changed = np.flatnonzero(~same)
-        self._numbers, self._roles, self.sds_m = numbers, roles, sds_m
-        crowded_out = len(boxes.ids) - len(chosen)
-        return SlotChanges(changed, numbers[changed], roles[changed], sds_m[changed], crowded_out)
+        changed = np.flatnonzero(~same | (planes != self._planes))
+        self._numbers, self._roles, self.sds_m, self._planes = numbers, roles, sds_m, planes
+        return SlotChanges(changed, numbers[changed], roles[changed], sds_m[changed], planes[changed], crowded_out)
 
     def whole(self) -> SlotChanges:
         """Return all slots as changes, for a process that has just started."""
-        return SlotChanges(np.arange(len(self._ids)), self._numbers, self._roles, self.sds_m, 0)
+        return SlotChanges(np.arange(len(self._ids)), self._numbers, self._roles, self.sds_m, self._planes, 0)
 
-    def apply(self, changes: SlotChanges, time_s: float) -> PerceivedObjects:
-        """Take over these changes and return the frame of that time.
+    def apply(self, changes: SlotChanges) -> None:
+        """Take over these changes.
 
         ValueError for numbers of slots or roles that do not exist, for numbers of another shape, and for NaN.
         """
@@ -127,18 +157,58 @@ class Slots:
         if changes.numbers.shape != (len(slots), BOX_NUMBERS):
             raise ValueError(f"numbers has the shape {changes.numbers.shape}; valid: {(len(slots), BOX_NUMBERS)}")
         require_finite("numbers", changes.numbers)
-        self._numbers[slots], self.sds_m[slots] = changes.numbers, changes.sds_m
+        if changes.planes.size and not -1 <= changes.planes.min() <= changes.planes.max() <= self._objects[-1]:
+            valid = f"valid: -1 to {self._objects[-1]}"
+            raise ValueError(f"planes = {changes.planes.min()} to {changes.planes.max()}; {valid}")
+        self._numbers[slots], self.sds_m[slots], self._planes[slots] = changes.numbers, changes.sds_m, changes.planes
         if (self._roles[slots] != changes.roles).any():
             self._roles[slots] = changes.roles
-            self._frame_roles = tuple(ROLES[role] for role in self._roles)
+            of_target = Role.TARGET if (self._roles[:PIECES] == _TARGET).any() else Role.OBSTACLE
+            self._frame_roles = (of_target, *(ROLES[role] for role in self._roles[PIECES:].tolist()))
         # Frames hold their numbers, so that an older one stays as it was.
         self._frame_numbers = self._frame_numbers.copy()
         self._write(slots)
-        return self._movers.frame(time_s, self._frame_numbers, self._frame_roles)
+
+    def frame(self, time_s: float, of_slots_m: FloatArray, unseen_m: float = 0.0) -> PerceivedObjects:
+        """Return the frame of all changes so far. of_slots_m (n,): σ_c of each slot. unseen_m: as in a frame."""
+        sds_m = np.concatenate([[of_slots_m[:PIECES].max()], of_slots_m[PIECES:]])
+        # The target is an object by itself.
+        surfaces = self._planes[PIECES - 1 :].copy()
+        surfaces[0] = -1
+        return self._movers.frame(
+            time_s, self._frame_numbers, self._frame_roles, unseen_m, sds_m=sds_m, surfaces=surfaces
+        )
 
     def _write(self, slots: IntArray) -> None:
         self._frame_numbers[slots, :BOX_NUMBERS] = self._numbers[slots]
-        self._frame_numbers[len(self._ids) + slots, : _SIZES.start] = self._numbers[slots, : _SIZES.start]
+        # An object's own frame is that of its first box.
+        own = slots[(slots == 0) | (slots >= PIECES)]
+        self._frame_numbers[len(self._ids) + self._objects[own], : _SIZES.start] = self._numbers[own, : _SIZES.start]
+
+
+def _assign(held: IntArray, ids: IntArray) -> None:
+    """Let boxes `ids` have slots, in place: each keeps its own, and new ones get the first that are free."""
+    slots = np.flatnonzero(held >= 0)
+    held[slots[~np.isin(held[slots], ids)]] = -1
+    new = np.flatnonzero(~np.isin(ids, held))
+    # Boxes of neighbouring numbers are neighbours, and a scene's blocks are of neighbouring slots.
+    held[np.flatnonzero(held < 0)[: len(new)]] = ids[new]
+
+
+def _by_first(planes: IntArray, objects: IntArray) -> IntArray:
+    """Return the number of each box's plane (n,) by its first object; -1 for a plane of one box. objects (n,) rise."""
+    _, first, of, count = np.unique(planes, return_index=True, return_inverse=True, return_counts=True)
+    named: IntArray = np.where(count > 1, objects[first], -1)[of]
+    return named
+
+
+def _fill_pieces(numbers: FloatArray, used: BoolArray) -> None:
+    """Put unused pieces, far smaller, into those in use: elsewhere they would be elsewhere for the whole target."""
+    if used.any():
+        of = np.flatnonzero(used)
+        spare = np.flatnonzero(~used)
+        numbers[spare] = numbers[of[np.arange(len(spare)) % len(of)]]
+        numbers[spare, _SIZES] = _SPECK_HALF_M
 
 
 def _unused(count: int) -> tuple[FloatArray, IntArray, FloatArray]:

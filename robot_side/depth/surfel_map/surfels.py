@@ -7,7 +7,7 @@ import numpy as np
 
 from common.arrays import FloatArray, IntArray
 from common.roles import ROLES
-from robot_side.depth.grid import Grid
+from robot_side.depth.grid import LEVELS, Grid
 from robot_side.depth.picture import DepthArray, DepthPicture, LabelArray
 from robot_side.depth.surfel_map.collecting import collect
 from robot_side.depth.surfel_map.folding import fold_layers
@@ -82,3 +82,10 @@ class SurfelMap:
         """Rows of the surfels that have been in two pictures"""
         top = int(self._counts[Count.TOP])
         return np.flatnonzero((self.table.cells[:top] >= 0) & (self.table.shown[:top] > 0))
+
+    def look_again(self, rows: IntArray) -> None:
+        """Let surfaces be looked for again where these surfels (n,) are."""
+        cells, (_, across, up) = self.grid.cells, self.grid.blocks
+        of = self.table.cells[rows]
+        i, j, k = of // (cells[1] * cells[2]), of // cells[2] % cells[1], of % cells[2]
+        self.dirty[((i >> LEVELS) * across + (j >> LEVELS)) * up + (k >> LEVELS)] = 1

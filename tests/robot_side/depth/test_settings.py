@@ -10,7 +10,6 @@ from robot_side.depth.settings import MapSettings
     [
         ({"cell_m": 0.0}, "cell_m = 0.0; valid: 0.004 to 0.05"),
         ({"slots": 10}, "slots = 10; valid: 64 to 16384"),
-        ({"unknown": 0.7}, "unknown = 0.7; valid: 0 to 0.5"),
         ({"lower_m": (0.0, 0.0)}, r"lower_m = \(0.0, 0.0\); valid: three coordinates"),
         ({"lower_m": (0.0, 0.0, 30.0)}, r"lower_m\[2\] = 30.0; valid: -20 to 20"),
         ({"upper_m": (1.0, -1.0, 1.0)}, "upper_m = "),

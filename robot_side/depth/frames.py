@@ -1,0 +1,48 @@
+"""Frames of the surfaces that were handed on, with their errors and their age."""
+
+import math
+from typing import Final
+
+import numpy as np
+
+from common.arrays import FloatArray
+from robot_side.depth.slots import SlotChanges, Slots
+from robot_side.surroundings.age import since
+from robot_side.surroundings.perceived import PerceivedObjects
+
+_LEVELS: Final = (1.0, 1.5, 2.5)
+"""Levels of σ_c, as factors of that of calibration and mount: the surfaces of each level take a look of their own"""
+_SLACK: Final = 1.08
+"""Factor up to which a greater error belongs to a level"""
+
+
+class SurfaceFrames:
+    """Newest surfaces, as the law gets them."""
+
+    def __init__(self, slots: int, camera_sd_m: float, unseen_m_s: float) -> None:
+        """slots: number of surfaces. camera_sd_m: σ_c of calibration and mount. unseen_m_s: as for RemoteObjects."""
+        self._slots, self._camera_sd_m, self._unseen_m_s = Slots(slots), camera_sd_m, unseen_m_s
+        self._taken_s = (math.inf, math.inf)
+        self._frame = self._slots.first
+        self._unseen_m = 0.0
+
+    def take(self, changes: SlotChanges, taken_s: tuple[float, float]) -> None:
+        """Take surfaces that have changed. taken_s: earliest and latest time of the newest picture."""
+        self._slots.apply(changes)
+        self._taken_s, self._unseen_m = taken_s, math.nan
+
+    def at(self, now_s: float) -> PerceivedObjects:
+        """Return the frame at `now_s`: the same object until something in it has changed."""
+        unseen_m = since(self._taken_s, now_s, self._unseen_m_s).unseen_m
+        if unseen_m != self._unseen_m:
+            self._unseen_m = unseen_m
+            self._frame = self._slots.frame(self._taken_s[0], self._sds_m(), unseen_m)
+        return self._frame
+
+    def _sds_m(self) -> FloatArray:
+        """Return σ_c of each slot (k,): of calibration and mount, and of the pixels that made the surface (eq. 1-2)."""
+        levels_m = self._camera_sd_m * np.array(_LEVELS)
+        whole_m = np.hypot(self._camera_sd_m, self._slots.sds_m)
+        level = np.searchsorted(_SLACK * levels_m, whole_m).clip(max=len(_LEVELS) - 1)
+        sds_m: FloatArray = levels_m[level]
+        return sds_m

@@ -1,0 +1,39 @@
+"""From pictures to surfaces that are handed on: the map, and a fixed pool of objects that shows it."""
+
+from common.arrays import FloatArray
+from common.roles import Role
+from robot_side.depth.depth_map import DepthMap, Integrated
+from robot_side.depth.picture import CameraPose, DepthErrors, DepthPicture, OwnBody
+from robot_side.depth.settings import MapSettings
+from robot_side.depth.slots import EXACT, TARGET_NAME, SlotChanges, Slots
+
+
+class DepthPerception:
+    """Surfaces from the pictures of several cameras."""
+
+    def __init__(self, settings: MapSettings) -> None:
+        self._errors = EXACT
+        self.last: Integrated | None = None
+        """What the newest picture did; None before the first"""
+        self._map = DepthMap(settings)
+        self._slots = Slots(settings.slots)
+
+    def see(self, picture: DepthPicture, pose: CameraPose, body: OwnBody, errors: DepthErrors, camera: int) -> None:
+        """Add a picture of `camera` to the map. pose, body: as they were when it was taken."""
+        self._errors = errors
+        self.last = self._map.integrate(picture, pose, body, errors, camera)
+
+    def changes(self, near_m: FloatArray) -> SlotChanges:
+        """Return what has changed since the last call, the surfaces nearest to `near_m` (3,) first."""
+        return self._slots.update(self._map.boxes(), near_m, self._errors)
+
+    def whole(self) -> SlotChanges:
+        """Return all surfaces as changes, for a process that has missed some."""
+        return self._slots.whole()
+
+    def set_role(self, name: str, role: Role) -> None:
+        """Give the role to the patch of surface around the object `name`; all of the target has one role."""
+        if name == TARGET_NAME and role is not Role.TARGET:
+            self._map.unmark(Role.TARGET)
+        elif (box := self._slots.box_of(name)) is not None:
+            self._map.mark(box, role)
