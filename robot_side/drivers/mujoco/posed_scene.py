@@ -1,7 +1,7 @@
 """True gripper among true objects, in any pose: for experiments that analyse a motion afterwards."""
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import mujoco  # type: ignore[import-untyped]
 import numpy as np
@@ -45,6 +45,11 @@ class PosedScene:
         data.geom_xpos[self._fixed] = self.scene.data.geom_xpos[self._fixed]
         data.geom_xpos[self._objects] += shift_m
         self._at_rest_m = data.geom_xpos[self._gripper].copy()
+
+    @property
+    def data(self) -> Any:
+        """State in the present pose, a mujoco.MjData whose geoms are placed"""
+        return self._data
 
     def tool_pose(self) -> tuple[FloatArray, FloatArray]:
         """Return the tool's position (3,) and rotation (3, 3), tool to world, in the present pose."""

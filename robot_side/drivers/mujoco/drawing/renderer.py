@@ -1,6 +1,6 @@
 """MuJoCo's off-screen renderer at its fastest, and where it looks from.
 
-MuJoCo fixes the graphics backend when it is imported: choose it before (`robot_side/viewing/off_screen.py`).
+MuJoCo fixes the graphics backend when it is imported: choose it before (`off_screen.py`).
 """
 
 from typing import Final

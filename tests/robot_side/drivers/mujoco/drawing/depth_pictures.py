@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from common.roles import Role
 from robot_side.depth.picture import CameraPose
-from robot_side.viewing.off_screen import choose
+from robot_side.drivers.mujoco.drawing.off_screen import choose
 
 WIDTH, HEIGHT, FOVY_DEG = 160, 120, 60.0
 FACE_M: Final = 0.6
@@ -43,7 +43,7 @@ TURNED: Final = CameraPose(
 def _write(path: str) -> None:
     import mujoco  # type: ignore[import-untyped]  # noqa: PLC0415  # after the choice of a backend
 
-    from robot_side.drivers.mujoco.depth_camera import DepthCamera  # noqa: PLC0415
+    from robot_side.drivers.mujoco.depth_cameras.rendered import DepthCamera  # noqa: PLC0415
 
     model = mujoco.MjModel.from_xml_string(SCENE)
     data = mujoco.MjData(model)

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from common.arrays import FloatArray
-from robot_side.drivers.mujoco.depth_camera import DepthCamera
-from robot_side.viewing.off_screen import BACKENDS
+from robot_side.drivers.mujoco.depth_cameras.rendered import DepthCamera
+from robot_side.drivers.mujoco.drawing.off_screen import BACKENDS
 from tests.helpers.python_process import ended
 from tests.robot_side.drivers.mujoco.drawing.depth_pictures import (
     BALL_LABEL,

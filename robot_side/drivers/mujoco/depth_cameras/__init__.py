@@ -1,0 +1,1 @@
+"""Depth cameras in the simulation: rendered pictures with the errors of real ones, and what is perceived by them."""
