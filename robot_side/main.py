@@ -22,7 +22,8 @@ from robot_side.core.robot_parts import RobotParts
 from robot_side.core.robot_side import RobotSide
 from robot_side.drivers.mujoco.viewpoints import first_person_eye, overview_eye
 from robot_side.drivers.remote.connected_drivers import ConnectedDrivers, driver_ports
-from robot_side.parts import build_parts, take_limits
+from robot_side.parts import SceneParts, build_parts, take_limits
+from robot_side.perceiving.starting import surfaced
 from robot_side.recording.recorder import RobotEncoder, RobotRecorder
 from robot_side.settings import RobotSettings
 from robot_side.tick.events import Listener
@@ -33,6 +34,7 @@ from robot_side.viewing.perceived_shapes import PerceivedModel
 from robot_side.viewing.pictures import Cameras
 from robot_side.viewing.scene_view import SceneView
 from robot_side.viewing.shapes import SceneModel
+from robot_side.viewing.surfaces import SurfaceModel
 
 _COMPILING: Final = (
     "compiling for this processor, some ten seconds at the first start (or beforehand: feelahead doctor --compile):"
@@ -81,32 +83,30 @@ def command(arguments: Sequence[str], adapt: Callable[[RobotParts], Adapted] = a
             process.stack.callback(log.close)
         door = process.stack.enter_context(Door(ports, process.note))
         drivers = ConnectedDrivers(door, process.note)
-        parts = build_parts(settings, epoch, clock_domain(), announce=process.note, drivers=drivers)
+        drivers.surfaces = surfaces = process.stack.enter_context(surfaced(settings, process.note))
+        parts = build_parts(settings, epoch, clock_domain(), announce=process.note, drivers=drivers, surfaces=surfaces)
         door.ready()
         recorder = [] if recording is None else [RobotRecorder(recording.noted.append)]
         core_parts, others = adapt(parts)
         physics = PhysicsTime(loop.clock, settings.seed)
-        core = RobotSide(core_parts, [physics, *recorder, *others])
+        core = RobotSide(core_parts, [physics, *recorder, *others, *([] if surfaces is None else [surfaces])])
         write_audit = audit_writer(log, core, door, process.note)
         sent = [stream for stream in SENT_STREAMS if settings.cameras.on or stream != "video"]
         unused = unused_clauses(settings.link_spec(), [("to_operator", stream) for stream in sent])
         for text in unused:
             process.note(text)
-        cameras = None
-        if settings.cameras.on:
-            cameras = Cameras(parts.scene, settings.cameras, process.note, sent=drivers.pictures)
-        if cameras is not None and settings.cameras.at_once:
-            now_s = loop.clock.now()
-            cameras.update(now_s, now_s, (), expected=True)
+        cameras = _cameras(settings, parts, drivers, process, loop.clock.now())
         warm_up(lambda ready, of: process.note(_COMPILING.format(ready, of)), parts.kernels)
         drivers.wait(write_audit)
+        if surfaces is not None:
+            surfaces.wait(parts.arm, parts.scene, loop.clock, write_audit)
         settings, note = take_limits(settings, parts, drivers)
         if note:
             process.note(note)
         if recording is not None:
             also = {"kernels": kernel_digests(), "notes": parts.notes}
             recording.begin(provenance(settings, epoch, clock_domain()) | also)
-        model = PerceivedModel(parts.scene) if parts.any_objects else SceneModel(parts.scene, parts.fixed)
+        model = _shown(settings, parts)
         eyes = (first_person_eye(parts.scene), overview_eye(parts.scene)) if settings.cameras.on else (None, None)
         view = SceneView(model, parts.kinematics, parts.explains, parts.enlarged, parts.surroundings, *eyes)
 
@@ -122,6 +122,25 @@ def command(arguments: Sequence[str], adapt: Callable[[RobotParts], Adapted] = a
             return turns
 
         return process.run(open_side)
+
+
+def _cameras(
+    settings: RobotSettings, parts: SceneParts, drivers: ConnectedDrivers, process: Process, now_s: float
+) -> Cameras | None:
+    """Return what makes pictures; None if none are wanted."""
+    if not settings.cameras.on:
+        return None
+    cameras = Cameras(parts.scene, settings.cameras, process.note, sent=drivers.pictures)
+    if settings.cameras.at_once:
+        cameras.update(now_s, now_s, (), expected=True)
+    return cameras
+
+
+def _shown(settings: RobotSettings, parts: SceneParts) -> SceneModel:
+    """Return what viewers see of the scene, by the kind of its objects."""
+    if settings.by_depth:
+        return SurfaceModel(parts.scene, parts.fixed, settings.depth_map.slots)
+    return PerceivedModel(parts.scene) if parts.any_objects else SceneModel(parts.scene, parts.fixed)
 
 
 if __name__ == "__main__":

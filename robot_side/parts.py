@@ -17,7 +17,7 @@ from robot_side.arm.limits import JointLimits
 from robot_side.compiled.kernel import Compiled, imported_kernels
 from robot_side.core.robot_parts import RobotParts
 from robot_side.drivers.mujoco.arm import MujocoArm, stand
-from robot_side.drivers.mujoco.camera import CameraError, MujocoCamera
+from robot_side.drivers.mujoco.camera import MujocoCamera
 from robot_side.drivers.mujoco.checks.cost import cost_findings
 from robot_side.drivers.mujoco.checks.following import following_findings
 from robot_side.drivers.mujoco.checks.joints import joint_findings
@@ -47,10 +47,10 @@ from robot_side.operators.episodes import Episodes
 from robot_side.operators.operator_session import OperatorSession
 from robot_side.operators.safety import Safety
 from robot_side.operators.tuning import Tuning
+from robot_side.perceiving.object_source import simulated_camera, source_of
 from robot_side.settings import RobotSettings
 from robot_side.surroundings.fixed_objects import fixed_objects, with_fixed
-from robot_side.surroundings.own_perception import perceived_by
-from robot_side.surroundings.perceived import KINDS, PerceivedObjects
+from robot_side.surroundings.perceived import KINDS, ObjectSource, PerceivedObjects
 from robot_side.surroundings.surroundings import Surroundings
 
 if TYPE_CHECKING:
@@ -94,12 +94,14 @@ def build_parts(
     announce: Callable[[str], None] | None = None,
     drivers: ConnectedDrivers | None = None,
     law: object = None,
+    surfaces: ObjectSource | None = None,
 ) -> SceneParts:
     """Make the parts; ConfigurationError for a model that cannot be used.
 
     scene: used instead of the scene that the settings name. announce: called with each note as soon as it is known, so
     that those about the model come before a long search. drivers: the connected drivers, whose arm and objects replace
-    the simulated ones. law: used instead of the law that the settings name (see `OwnLaw`).
+    the simulated ones. law: used instead of the law that the settings name (see `OwnLaw`). surfaces: source by depth
+    cameras in another process, for --depth or --perception depth; None: the simulated ones work in this process.
     """
     if (settings.model is None) != (settings.site is None):
         given, missing = ("--model", "--site") if settings.site is None else ("--site", "--model")
@@ -120,13 +122,13 @@ def build_parts(
         say(text)
     searching = None if announce is None else SearchNotes(announce)
     kinematics = MujocoKinematics(scene, settings.cover_m, searching)
-    camera = _camera(settings, scene, int(camera_noise))
+    camera = simulated_camera(settings, scene, int(camera_noise))
     surroundings = Surroundings()
     unseen_m_s = settings.camera.unseen_m_s
     seen_elsewhere = None if drivers is None else drivers.objects(settings.roles, unseen_m_s, surroundings.see)
     fixed = fixed_objects(settings.workspace_m, settings.arm_keep_out)
     # Before the first tick, as a search for spheres takes far longer than one.
-    first = as_loaded(scene, scene.roles) if settings.objects is None else perceived([], [], 0.0)
+    first = perceived([], [], 0.0) if settings.sees_any else as_loaded(scene, scene.roles)
     held_covers = HeldCovers(first, settings.cover_m, scene.never_held, searching)
     prediction, prediction_note = settings.prediction_for(scene.robot.fingerprint)
     errors = settings.uncertainty(prediction)
@@ -146,7 +148,7 @@ def build_parts(
     return SceneParts(
         arm=arm,
         kinematics=kinematics,
-        camera=with_fixed(seen_elsewhere or perceived_by(settings.perception, camera), fixed),
+        camera=with_fixed(seen_elsewhere or surfaces or source_of(settings, scene, camera, int(camera_noise)), fixed),
         fixed=fixed,
         law=law,
         explains=law,
@@ -167,8 +169,8 @@ def build_parts(
         frames=stick_frames(scene),
         motion=settings.capped_motion,
         scene=scene,
-        any_objects=settings.objects is not None,
-        truth=SimulationObserver(scene) if settings.arm is None and settings.objects is None else None,
+        any_objects=settings.sees_any,
+        truth=SimulationObserver(scene) if settings.simulates_all else None,
         held_covers=held_covers,
         bounds=settings.bounds,
         assists=settings.assist == "speed",
@@ -235,11 +237,6 @@ def _slides(scene: Scene) -> BoolArray:
     """Return whether each of the arm's joints slides, (n,)."""
     slides: BoolArray = scene.model.jnt_type[scene.robot.arm_joints] == JointKind.SLIDE
     return slides
-
-
-def _camera(settings: RobotSettings, scene: Scene, seed: int) -> MujocoCamera:
-    error = settings.camera.mean_vector_m, settings.camera.sd_m, settings.camera.frame_sd_m
-    return MujocoCamera(scene, CameraError(tuple(thing.name for thing in scene.objects), *error, seed))
 
 
 def _notes(scene: Scene, settings: RobotSettings, travel: GripperTravel | None) -> tuple[str, ...]:

@@ -15,6 +15,8 @@ from common.roles import Role
 from robot_side.arm.bounds import Bounds, KeepOut, Workspace
 from robot_side.arm.limits import ArmLimits
 from robot_side.arm.tool_motion import ToolMotionSettings
+from robot_side.depth.camera_settings import BY_DEPTH, DepthCameraSettings, LinkMount
+from robot_side.depth.settings import MapSettings
 from robot_side.drivers.mujoco.built_in_scenes import SceneName
 from robot_side.drivers.mujoco.robot_model import SiteAxis
 from robot_side.enlargement.distance import Uncertainty, Vector3
@@ -125,9 +127,12 @@ class RobotSettings(PaperFlags, SideOptions):
     pictures: Annotated[str | None, tyro.conf.arg(metavar="tcp://HOST:PORT")] = None
     """Address at which your camera process connects (docs/drivers.md). The views that it sends replace the simulated
     ones."""
-    perception: Annotated[str | None, tyro.conf.arg(metavar="NAME|FILE.py")] = None
-    """Perception of your own in this process: a function that gets the simulated camera and returns the one to use
-    (docs/python.md)."""
+    perception: Annotated[str | None, tyro.conf.arg(metavar="depth|NAME|FILE.py")] = None
+    """What perceives objects in the simulation. depth: simulated depth cameras, which see surfaces that nobody modelled
+    (docs/depth.md). Or perception of your own in this process: a function that gets the simulated camera and returns
+    the one to use (docs/python.md)."""
+    depth: Annotated[str | None, tyro.conf.arg(metavar="tcp://HOST:PORT")] = None
+    """Address at which your depth cameras' process connects (docs/depth.md)."""
     scene: Annotated[SceneName | None, tyro.conf.arg(metavar="{table,wall,slot,shelf}")] = None
     """Scene of the built-in arm. table (the default): a cluttered table. wall: a wall 10 to 60 mm behind the target.
     slot: two posts on the way, with 15 to 40 mm of clearance on each side. shelf: a shelf with a raised front edge to
@@ -159,6 +164,10 @@ class RobotSettings(PaperFlags, SideOptions):
     """Only in a TOML file: [roles] NAME = "obstacle", "target", "support" or "ignored"; by default by the names."""
     encoder: EncoderSettings = field(default_factory=EncoderSettings)
     camera: CameraSettings = field(default_factory=CameraSettings)
+    depth_camera: DepthCameraSettings = field(default_factory=DepthCameraSettings)
+    depth_map: MapSettings = field(default_factory=MapSettings)
+    depth_mounts: Annotated[dict[str, LinkMount], tyro.conf.Suppress] = field(default_factory=dict)
+    """Only in a TOML file: [depth.mounts.NAME], by the names of the cameras that send pictures to --depth."""
     cameras: CamerasSettings = field(default_factory=CamerasSettings)
     motion: ToolMotionSettings = field(default_factory=ToolMotionSettings)
     safety: SafetySettings = field(default_factory=SafetySettings)
@@ -178,10 +187,26 @@ class RobotSettings(PaperFlags, SideOptions):
             raise ValueError("--pictures and --no-cameras exclude each other; valid: one of them")
         require_law(self.law)
         if self.perception is not None:
-            require_name("perception", self.perception, ())
-            if self.objects is not None:
-                raise ValueError("--perception and --objects exclude each other; valid: one of them")
+            require_name("perception", self.perception, (BY_DEPTH,))
+        sources = [f"--{name}" for name in ("perception", "objects", "depth") if getattr(self, name) is not None]
+        if len(sources) > 1:
+            raise ValueError(f"{' and '.join(sources)} exclude each other; valid: one of them")
         self.uncertainty(PredictionErrors())
+
+    @property
+    def by_depth(self) -> bool:
+        """Whether depth cameras perceive the objects"""
+        return self.depth is not None or self.perception == BY_DEPTH
+
+    @property
+    def sees_any(self) -> bool:
+        """Whether objects of any kind may appear: sent ones, or surfaces that depth cameras see"""
+        return self.objects is not None or self.by_depth
+
+    @property
+    def simulates_all(self) -> bool:
+        """Whether arm and objects are simulated, however they are perceived"""
+        return self.arm is None and self.objects is None and self.depth is None
 
     @property
     def workspace_m(self) -> tuple[Vector3, Vector3] | None:

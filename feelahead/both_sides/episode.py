@@ -31,11 +31,12 @@ from robot_side.arm.own_arm import moved_by
 from robot_side.compiled.warm_up import warm_up
 from robot_side.core.robot_parts import RobotParts
 from robot_side.core.robot_side import RobotSide
+from robot_side.depth.camera_settings import BY_DEPTH
 from robot_side.drivers.mujoco.scene import Scene, load_scene
 from robot_side.drivers.mujoco.true_contact import TrueContact
 from robot_side.parts import build_parts
+from robot_side.perceiving.own_perception import perceived_by
 from robot_side.settings import RobotSettings
-from robot_side.surroundings.own_perception import perceived_by
 from robot_side.tick import events
 
 if TYPE_CHECKING:
@@ -94,6 +95,7 @@ class Episode:
 
     def _build(self) -> None:
         named = self._given | law_setting(self.law)
+        named |= {"perception": BY_DEPTH} if self.perception == BY_DEPTH else {}
         self.settings = robot = side_settings(RobotSettings, self._bases[0], named)
         self.operator_settings = side_settings(OperatorSettings, self._bases[1], self._given)
         if (robot.model is None) != (robot.site is None):
@@ -106,7 +108,7 @@ class Episode:
         )
         self.parts = replace(
             parts,
-            camera=perceived_by(self.perception, parts.camera),
+            camera=perceived_by(None if self.perception == BY_DEPTH else self.perception, parts.camera),
             arm=moved_by(self.own_arm, parts.arm),
         )
         self._sampler = None
@@ -114,6 +116,7 @@ class Episode:
             self._sampler = Sampler(lambda: self.loop, self.scene, TrueContact(self.scene))
         notes, listeners = self._recording, [*self._listeners]
         listeners += [] if self._sampler is None else [self._sampler]
+        listeners += [self.parts.camera] if isinstance(self.parts.camera, events.Listener) else []
         robot_side = RobotSide(self.parts, listeners if notes is None else [*listeners, notes.robot])
         warm_up()  # after the scene was loaded, as it decides which kernels are imported
         hearing = [*self._operator_listeners, *([] if notes is None else [notes.operator])]

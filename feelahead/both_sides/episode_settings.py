@@ -20,7 +20,7 @@ _Settings = TypeVar("_Settings", RobotSettings, OperatorSettings)
 _OF_PROCESSES: Final = {
     *("arm", "asymmetry", "audit", "bind", "cameras", "config", "connect", "connections", "console", "console_port"),
     *("console_token", "controller", "device", "duration", "insecure", "keys", "law", "objects", "perception"),
-    "pictures",
+    *("depth", "pictures"),
     *("person", "person_file", "person_waits", "pull_n", "realtime", "record", "robot_key", "status", "summary", "tui"),
     *("view_bind", "view_connect"),
 }

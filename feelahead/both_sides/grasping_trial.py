@@ -18,6 +18,7 @@ from operator_side.dualsense.simulated.trigger_model import zone_of
 from operator_side.people.person import SimulatedOperator
 from operator_side.people.settings import PersonSettings
 from operator_side.settings import OperatorSettings
+from robot_side.depth.camera_settings import BY_DEPTH, DepthCameraSettings
 from robot_side.drivers.mujoco.built_in_scenes import SceneName
 from robot_side.drivers.mujoco.ground_truth import GroundTruth
 from robot_side.drivers.mujoco.robot_model import SiteAxis
@@ -44,6 +45,9 @@ MISJUDGES_DEPTH: Final = PersonSettings(aiming="move-and-wait", depth_error_sd_m
 """Person who sees no obstacle and misjudges distances"""
 
 
+_MOUNT_M = 0.002
+
+
 @dataclass(frozen=True)
 class Trial:
     """Settings of one trial; two trials with the same seed that differ only in `arm` are a pair."""
@@ -68,6 +72,8 @@ class Trial:
     """Law of the stiffness, by its name or file; empty: the default"""
     paper: PaperSettings = field(default_factory=PaperSettings)
     """Settings of the paper's laws"""
+    by_depth: bool = False
+    """Whether depth cameras perceive the scene: one beside the gripper and one on it, 2 mm away from where they seem"""
 
 
 class _Silent:
@@ -109,6 +115,8 @@ class Watch(Listener):
             law=trial.law or "swept",
             law_paper_share=trial.paper.share,
             enlargement=trial.paper.enlargement,
+            perception=BY_DEPTH if trial.by_depth else None,
+            depth_camera=DepthCameraSettings(mount_error_m=_MOUNT_M),
         )
         operator = OperatorSettings(
             link=trial.link,

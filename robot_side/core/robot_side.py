@@ -141,7 +141,8 @@ class RobotSide:
         outgoing = self.reports.outgoing(permission, situation, sensed, *done, now_s)
         holds_target = grip.index is not None and grip.index == sight.target
         found = permission.state, self.motion.commanded_rad_s, state, situation, sensed
-        self._found = Found(*found, holds_target, sight.target_m)
+        held = None if grip.held is None else grip.held.spheres_in_tool
+        self._found = Found(*found, holds_target, sight.target_m, held)
         return outgoing
 
     def _follow_operator(self, now_s: float, late_s: float, state: ArmState) -> float:
@@ -195,7 +196,7 @@ class RobotSide:
         self._heard.on_step("frame")
         seen: list[Outgoing] = []
         if (found := self._found) is not None:
-            motion_state, _, state, situation, sensed, _, target_m = found
+            motion_state, _, state, situation, sensed, _, target_m, _ = found
             target = None if self.sight.target is None else situation.objects.names[self.sight.target]
             shown = situation, sensed, state, target, target_m, self.motion.hindrance
             seen = self.reports.telemetry(motion_state, *shown, now_s)

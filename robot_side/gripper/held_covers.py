@@ -11,7 +11,7 @@ from common.roles import Role
 from robot_side.gripper.kept_covers import SearchNotes, kept_cover
 from robot_side.gripper.search_work import SearchWork
 from robot_side.gripper.solids import Solid, convex_solid
-from robot_side.gripper.spheres import cover_boxes
+from robot_side.gripper.spheres import cells_cover, cover_boxes
 from robot_side.gripper.surface_cover import cover_surface
 from robot_side.surroundings.perceived import KINDS, PerceivedObjects
 
@@ -22,6 +22,8 @@ _MOST_SHAPES = 32
 """Maximum number of meshes, and of objects of tetrahedra, for which spheres are searched; a first search takes up to
 seconds."""
 _MOST_TETRAHEDRA = 64
+_MOST_BOXES = 16
+"""Number of an object's boxes from which on no few spheres are searched: those are surfaces that a camera saw"""
 _WIDEST_M = 0.2
 """Width, in m: an object that is wider in every direction fits no gripper."""
 _SAME_VOLUME = 1e-6
@@ -119,6 +121,9 @@ class HeldCovers:
                 rows &= ~np.isin(objects.mesh_index, list(self._meshes))
             if kind.in_box and rows.any():
                 centers, rotations, half_sizes, *_ = (column[rows] for column in kind.read(objects))
+                if len(centers) > _MOST_BOXES:
+                    found.append(cells_cover(centers, rotations, half_sizes))
+                    continue
                 cover = cover_boxes(centers, rotations, half_sizes, self._stand_out_m)
                 spheres: _Spheres = cover.centers_m, cover.radii_m
                 found.append(

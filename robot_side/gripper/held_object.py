@@ -1,6 +1,7 @@
 """Held object: it is removed from the surroundings, and its spheres move with the gripper."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -26,6 +27,11 @@ class HeldObject:
     """(m + k,) radii of the gripper's spheres, then of the object's"""
     on_finger: BoolArray
     """(m + k,) whether each sphere belongs to a finger"""
+
+    @cached_property
+    def spheres_in_tool(self) -> FloatArray:
+        """(k, 4) the object's spheres in the tool frame: centres and radii"""
+        return np.column_stack([self.centers_in_tool_m, self.radii_m[-len(self.centers_in_tool_m) :]])
 
 
 def gripped_object(scene: SceneTable, tool_position_m: FloatArray, reach_m: float) -> int | None:

@@ -21,6 +21,8 @@ _MOST_SPHERES_OF_A_BOX = 2000
 # Share of the allowed protrusion that a plan leaves unused, far above rounding, so that no corner is just outside.
 _MARGIN = 1e-6
 _FRACTIONS = tuple(0.40 + 0.04 * step for step in range(15))
+_CELL_M = 0.02
+_SPECK_M = 0.001
 
 
 @dataclass(frozen=True)
@@ -177,3 +179,22 @@ def _layer(half_sizes_m: tuple[float, ...], done_m: float, stand_out_m: float) -
         if math.prod(counts) < math.prod(fewest.counts):
             fewest = _Lattice(tuple(spans), tuple(counts))
     return fewest
+
+
+def cells_cover(
+    centers_m: FloatArray, rotations: FloatArray, half_sizes_m: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return a sphere around each cell of boxes (n,), without a search: centres (m, 3) and radii (m,).
+
+    Cells are at most 20 mm wide; specks within other boxes are left out. A box's spheres stand out from it by up to
+    7 mm.
+    """
+    centers, radii = [np.empty((0, 3))], [np.empty(0)]
+    for center_m, rotation, half_m in zip(centers_m, rotations, half_sizes_m, strict=True):
+        if half_m.max() > _SPECK_M:
+            count = np.maximum(np.ceil(2.0 * half_m / _CELL_M), 1.0).astype(int)
+            axes = [half * (2.0 * np.arange(n) + 1.0 - n) / n for half, n in zip(half_m, count, strict=True)]
+            places = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+            centers.append(center_m + places @ rotation.T)
+            radii.append(np.full(len(places), float(np.linalg.norm(half_m / count))))
+    return np.concatenate(centers), np.concatenate(radii)

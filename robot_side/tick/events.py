@@ -33,6 +33,8 @@ class Found(NamedTuple):
     holds_target: bool
     target_m: FloatArray | None
     """(3,) centre of the target as perceived"""
+    held: FloatArray | None
+    """(k, 4) spheres of the held object in the tool's frame: centres and radii; None if nothing is held"""
 
 
 class Tick(NamedTuple):

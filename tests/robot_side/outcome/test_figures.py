@@ -97,7 +97,7 @@ def test_the_overlap_is_worked_out_ten_times_a_second_once_the_loop_age_is_known
         here = situation(gripper_pose(), loop_age_s=0.004 * tick, loop_age_known=tick >= 25)
         # In the last 50 ticks there is too much to look at.
         seen = replace(sensed(0.0), cut=tick > 100)
-        found = Found("armed", None, state, here, seen, False, None)
+        found = Found("armed", None, state, here, seen, False, None, None)
         figures.on_tick(Tick(now_s, state, None, 0.0, (), found))
         figures.on_sent(now_s)
         assert (figures.overlap_m3 is None) is (tick < 25)

@@ -1,0 +1,100 @@
+"""Messages between the robot side and the process that maps depth pictures.
+
+robot side ── Setup, Joints, RoleOf ──▶ companion
+robot side ◀── Ready, Surfaces, Note, Refusal ── companion
+"""
+
+from typing import Final
+
+import msgspec
+
+from common.roles import Role
+from common.sockets.door.messages import DoorSettings
+from robot_side.depth.camera_settings import DepthCameraSettings, LinkMount
+from robot_side.depth.settings import MapSettings
+
+
+class Loaded(msgspec.Struct, frozen=True):
+    """Arguments with which the robot side loaded its scene."""
+
+    model: str | None
+    site: str | None
+    roles: dict[str, Role]
+    name: str
+    seed: int
+    site_axis: str
+
+
+class Setup(msgspec.Struct, frozen=True, tag=True):
+    """First message to the companion."""
+
+    scene: Loaded
+    camera: DepthCameraSettings
+    mapped: MapSettings
+    mounts: dict[str, LinkMount]
+    encoder: tuple[float, float]
+    """σ and resolution of the joints' readings"""
+    port: DoorSettings | None
+    """Port at which pictures arrive; None: cameras are simulated"""
+    seed: int
+
+
+class Joints(msgspec.Struct, frozen=True, tag=True):
+    """Where the robot was; from a simulation, where everything was."""
+
+    time_s: float
+    """Time of the measurement, on the monotonic clock that both processes read"""
+    arm: bytes
+    """(n,) float64: readings of the arm's joints"""
+    fingers: bytes
+    """(f,) float64: readings of the gripper's joints"""
+    held: bytes
+    """(k, 4) float64: spheres of what the gripper holds, in the tool's frame; centres and radii"""
+    positions: bytes = b""
+    """MuJoCo's qpos, as float64; empty if nothing is simulated"""
+
+
+class RoleOf(msgspec.Struct, frozen=True, tag=True):
+    """New role of an object, by the name that it has at the robot side."""
+
+    name: str
+    role: Role
+
+
+class Ready(msgspec.Struct, frozen=True, tag=True):
+    """Answer to Setup: from now on pictures are taken."""
+
+    endpoint: str
+    """Address of the port; empty if cameras are simulated"""
+
+
+class Surfaces(msgspec.Struct, frozen=True, tag=True):
+    """Surfaces that have changed (see `SlotChanges`), and what the pictures were like."""
+
+    taken_s: tuple[float, float]
+    """Earliest and latest time at which the newest picture was taken"""
+    slots: bytes
+    numbers: bytes
+    roles: bytes
+    sds_m: bytes
+    planes: bytes
+    crowded_out: int
+    seen: dict[str, float]
+    """Figures of the pictures since the last message, and of the map"""
+
+
+class Note(msgspec.Struct, frozen=True, tag=True):
+    """Line for a person."""
+
+    text: str
+
+
+class Refusal(msgspec.Struct, frozen=True, tag=True):
+    """Nothing can be seen: the reason, and what to do about it."""
+
+    reason: str
+
+
+encode: Final = msgspec.msgpack.Encoder().encode
+decode_to_companion: Final = msgspec.msgpack.Decoder(Setup | Joints | RoleOf).decode
+decode_from_companion: Final = msgspec.msgpack.Decoder(Ready | Surfaces | Note | Refusal).decode
