@@ -21,16 +21,22 @@ from feelahead.lab.approaches.judging import false_alarms, strength_before_relea
 from feelahead.lab.approaches.laws import TriedLaw, paper_figures, with_papers
 from feelahead.lab.approaches.placements import Collision, first_touch_s, place
 from feelahead.lab.approaches.pulls import PullKind
+from feelahead.lab.approaches.recorded_depth import RecordedDepth
 from feelahead.lab.approaches.recording import record_approach
 from feelahead.lab.approaches.replay import Replay
 from feelahead.lab.approaches.strengths import Draw, Judged
 from feelahead.lab.table import Row
 from operator_side.controller.feel import MAX_STRENGTH
+from robot_side.depth.camera_settings import DepthCameraSettings
+from robot_side.depth.frames import SurfaceFrames
+from robot_side.depth.settings import MapSettings
 from robot_side.drivers.mujoco.camera import CameraError
+from robot_side.drivers.mujoco.depth_cameras.rig import DepthRig
+from robot_side.drivers.mujoco.encoders import Encoder
 from robot_side.drivers.mujoco.posed_scene import PosedScene
 from robot_side.drivers.mujoco.scene import Scene, load_scene
 from robot_side.laws.paper_settings import PaperSettings
-from robot_side.settings import EncoderSettings
+from robot_side.settings import CameraSettings, EncoderSettings
 
 LINKS: Final = {
     "0 ms": "",
@@ -56,6 +62,15 @@ class Placement:
     """Factor by which the encoder errors of the settings are multiplied."""
     speed_m_s: float = 0.0
     """Speed of the objects along the approach, in m/s; below 0 they come nearer."""
+    depth: DepthCameraSettings | None = None
+    """Depth cameras that perceive the objects; None: the objects themselves are perceived."""
+
+    @property
+    def seen_by(self) -> str:
+        """What perceives the objects, as it is printed"""
+        if self.depth is None:
+            return "objects"
+        return f"{self.depth.eyes}, noise x{self.depth.noise:g}, mount {1e3 * self.depth.mount_error_m:g} mm"
 
     @property
     def shown(self) -> str:
@@ -67,7 +82,7 @@ class Placement:
     def key(self, pull: str, link: str) -> str:
         """Return the cell's name, which --only searches."""
         drawn = f"camera {self.camera_mm:g} mm", f"encoders x{self.encoder_factor:g}"
-        return "/".join((self.shown, pull, link, *drawn))
+        return "/".join((self.shown, pull, link, *drawn, *(() if self.depth is None else (self.seen_by,))))
 
 
 @dataclass(frozen=True)
@@ -130,6 +145,11 @@ class _Staged:
         """Return the approach to objects moved by shift_m (3,), perceived with the camera's `number`-th error."""
         record, names = self.replay.record, tuple(thing.name for thing in self.posed.scene.objects)
         sd_m = 1e-3 * cell.camera_mm
+        if cell.depth is not None:
+            rig = _rig(cell.scene, cell.depth, cell.encoder_factor)
+            moved, seed = (shift_m, cell.speed_m_s), seed_of(record.seed, number)
+            seen = RecordedDepth(self.replay, self.posed, rig, *moved, lambda: _frames(sd_m), seed)
+            return Draw(self.replay, seen.at, sd_m, cell.speed_m_s)
         errors_m = CameraError(names, 0.0, sd_m, 0.0, seed_of(record.seed, number)).next_frame()
         self.posed.set_pose(record.joint_positions_rad[0], record.finger_positions[0], shift_m)
         return Draw(self.replay, self.posed.perceived(errors_m), sd_m, cell.speed_m_s)
@@ -152,7 +172,7 @@ def evaluate(pulls: Pulls, seed: int) -> Iterator[Row]:
                 _count_covered(counts, law, cell, staged)
                 _count_alarms(counts, law, cell, staged, pulls.judged_s)
                 row: Row = {"cell": cell.key(pulls.pull, pulls.link), "scene": cell.shown}
-                row |= {"camera_mm": cell.camera_mm, "encoder_factor": cell.encoder_factor}
+                row |= {"camera_mm": cell.camera_mm, "encoder_factor": cell.encoder_factor, "seen_by": cell.seen_by}
                 row |= {"law": name, "probability": probability, **paper_figures(paper)}
                 yield row | _figures(counts, staged, probability)
 
@@ -160,6 +180,16 @@ def evaluate(pulls: Pulls, seed: int) -> Iterator[Row]:
 @cache
 def _scene(name: str) -> Scene:
     return load_scene(frozen_scene(name), SITE)
+
+
+def _frames(sd_m: float) -> SurfaceFrames:
+    return SurfaceFrames(MapSettings().slots, sd_m, CameraSettings().unseen_m_s)
+
+
+@cache
+def _rig(scene: str, depth: DepthCameraSettings, encoder_factor: float) -> DepthRig:
+    encoder = Encoder(encoder_factor * EncoderSettings().sigma_rad, EncoderSettings().resolution_rad)
+    return DepthRig(_scene(scene), depth, MapSettings(), encoder, 0)
 
 
 def seed_of(*numbers: int) -> int:

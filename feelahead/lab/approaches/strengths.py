@@ -1,6 +1,7 @@
 """Compute the strengths that a law gives to the triggers' zones at given times of a recorded approach."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cache
 from typing import Final
@@ -39,8 +40,8 @@ class Draw:
     """One recorded approach to objects that are perceived with one draw of the camera's error."""
 
     replay: Replay
-    objects: PerceivedObjects
-    """Objects as perceived when the pull begins."""
+    objects: PerceivedObjects | Callable[[float], PerceivedObjects]
+    """Objects as perceived when the pull begins, or a function that returns the newest frame at rising times."""
     camera_sd_m: float
     """Standard deviation σ_c that the robot side assumes, in metres; it equals the true one here."""
     speed_m_s: float = 0.0
@@ -48,6 +49,8 @@ class Draw:
 
     def objects_at(self, time_s: float) -> PerceivedObjects:
         """Return the newest camera frame at `time_s`; objects at rest have the same frame at all times."""
+        if not isinstance(self.objects, PerceivedObjects):
+            return self.objects(time_s)
         if self.speed_m_s == 0.0:
             return self.objects
         since_s = math.floor(max(time_s - self.replay.record.began_s, 0.0) / _FRAME_S) * _FRAME_S

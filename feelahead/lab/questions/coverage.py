@@ -15,27 +15,27 @@ from rich.console import RenderableType
 from rich.table import Table as Shown
 
 from feelahead.lab.approaches.approach import compile_kernels
+from feelahead.lab.approaches.coverage_cells import depth_cells, full_cells, quick_cells
 from feelahead.lab.approaches.evaluation import LINKS, Placement, Pulls, evaluate
-from feelahead.lab.approaches.frozen import AHEAD, PASSED, frozen_hash
+from feelahead.lab.approaches.frozen import frozen_hash
 from feelahead.lab.approaches.laws import TriedLaw, is_paper, require_tried
 from feelahead.lab.approaches.pulls import PULL_KINDS, PullKind
 from feelahead.lab.figures import colour_of, figure
 from feelahead.lab.sweep import Question, Sweep
 from feelahead.lab.table import Row, Table
 from feelahead.printing.figures import shown
+from robot_side.depth.camera_settings import Perception
 from robot_side.laws.paper_settings import PaperFlags
 
 HOMES: Final = {"u_mesh": "mug", "mug": "mug"}
 """Scenes whose home pose differs from that of `empty`, with the scene in which their approaches are recorded."""
 COMPARED: Final = ("swept", "swept_robot", "paper", "none", "full")
-_NOT_STILL: Final = ("moving", "fleeing", "place_held", "terrain_ahead")
-"""Scenes that only `try approach` uses: objects that move by themselves or with the gripper, and a hill."""
 QUICK_SIZES: Final = (10, 4)
 """Number of approaches of each motion, and of placements of the objects for each, with --quick."""
 QUICK_JUDGED_S, JUDGED_S = 60.0, 600.0
 """Minimum time judged for false alarms, in seconds, over all cells of one kind of motion."""
 _MARKS: Final = ("o", "s", "^", "D")
-_CELL: Final = ("scene", "pull", "link", "camera_mm", "encoder_factor", "probability")
+_CELL: Final = ("scene", "seen_by", "pull", "link", "camera_mm", "encoder_factor", "probability")
 _Probability = Annotated[float, Meta(gt=0.0, le=0.9999)]
 """Probability P; the greatest takes 100 000 draws for each cell."""
 
@@ -57,6 +57,8 @@ class CoverageSettings(PaperFlags, Sweep):
     is printed), none, full (always the strongest effect), or files of your own."""
     probabilities: Annotated[tuple[_Probability, ...], tyro.conf.arg(metavar="P...")] = ()
     """Judge only these P, instead of those planned for each cell; each takes n >= 10/(1 - P) draws for each cell."""
+    perception: Annotated[Perception, tyro.conf.arg(metavar="{objects,depth}")] = "objects"
+    """What is perceived: the objects themselves, with the camera's error, or surfaces that depth cameras see."""
     only: Annotated[tuple[str, ...], tyro.conf.arg(metavar="TEXT...")] = ()
     """Judge only cells whose name, such as 'wall/bell/200 ms', contains one of these texts."""
 
@@ -72,7 +74,7 @@ class CoverageSettings(PaperFlags, Sweep):
     def pulls(self) -> list[Pulls]:
         """Return the motions with their chosen cells; motions with the most cells come first."""
         found: dict[tuple[PullKind, str, str], list[Placement]] = {}
-        for pull, link, cell in quick_cells() if self.quick else full_cells():
+        for pull, link, cell in self._cells():
             if not self.only or any(text in cell.key(pull, link) for text in self.only):
                 mine = found.setdefault((pull, link, HOMES.get(cell.scene, "empty")), [])
                 mine += [cell] if cell not in mine else []
@@ -90,39 +92,15 @@ class CoverageSettings(PaperFlags, Sweep):
         ]
         return sorted(motions, key=lambda pulls: -len(pulls.cells))
 
+    def _cells(self) -> Iterator[tuple[PullKind, str, Placement]]:
+        if self.perception == "depth":
+            return depth_cells(quick=self.quick)
+        return quick_cells() if self.quick else full_cells()
+
 
 def cells(settings: CoverageSettings) -> Sequence[Pulls]:
     """Return the cells: motions to record and judge."""
     return settings.pulls()
-
-
-def full_cells() -> Iterator[tuple[PullKind, str, Placement]]:
-    """Yield all cells: every scene with a steady pull over four links, every pull over two links, then single changes.
-
-    The single changes are drifts and turns in more scenes, and objects that come nearer or go away.
-    """
-    yield from (("steady", link, Placement("wall")) for link in LINKS)
-    still = [name for name in (*AHEAD, *PASSED) if name not in _NOT_STILL]
-    yield from (("steady", link, Placement(name)) for link in ("0 ms", "50 ms", "200 ms", "400 ms") for name in still)
-    for link in ("50 ms", "200 ms"):
-        for pull in PULL_KINDS:
-            for name in ("wall", "post", "rod_5mm", "wall_beside", "table_1_box", "cluttered"):
-                yield pull, link, Placement(name)
-        for name in ("plate", "ball", "slot", "u_mesh", "mug"):
-            yield "drift", link, Placement(name)
-            yield "yaw", link, Placement(name)
-        yield "drift", link, Placement("edge")
-        yield "yaw", link, Placement("turn")
-        yield from (("bell", link, Placement(name, speed_m_s=v)) for name in ("wall", "ball") for v in (-0.06, 0.03))
-        yield from (("bell", link, Placement("wall", camera_mm)) for camera_mm in (1.0, 6.0))
-    yield "bell", "200 ms", Placement("wall", encoder_factor=10.0)
-
-
-def quick_cells() -> Iterator[tuple[PullKind, str, Placement]]:
-    """Yield the few cells of --quick, which show whether anything is wrong."""
-    for name in ("wall", "rod_5mm", "wall_beside", "table_1_box"):
-        yield "steady", "50 ms", Placement(name)
-        yield "bell", "200 ms", Placement(name)
 
 
 def run(cell: Pulls, seed: int) -> Iterator[Row]:
@@ -152,7 +130,7 @@ def judged(table: Table) -> Table:
 
 def _by_cell(found: Table, laws: Sequence[str], title: str, entry: Callable[[Row], str]) -> Shown:
     rows = []
-    for (scene, pull, link, camera_mm, encoders, probability), of_cell in found.groups(*_CELL):
+    for (scene, seen_by, pull, link, camera_mm, encoders, probability), of_cell in found.groups(*_CELL):
         some, entries = of_cell.rows[0], [entry(row) for law in laws for row in of_cell.where(law=law)]
         if any(entries):
             camera = f"{camera_mm:g} mm{f', encoders x{encoders:g}' if encoders != 1.0 else ''}"
@@ -160,8 +138,8 @@ def _by_cell(found: Table, laws: Sequence[str], title: str, entry: Callable[[Row
                 f"{some['draws']} ({some['approaches']})",
                 " / ".join(str(some[name]) for name in ("unavoidable", "unknowable", "not_found")),
             )
-            rows.append((scene, pull, link, camera, probability, *count, some["judged_s"] / 60.0, *entries))
-    return shown(title, ("scene", "pull", "link", "camera", "P", "n", "apart", "minutes", *laws), rows)
+            rows.append((scene, seen_by, pull, link, camera, probability, *count, some["judged_s"] / 60.0, *entries))
+    return shown(title, ("scene", "seen by", "pull", "link", "camera", "P", "n", "apart", "minutes", *laws), rows)
 
 
 def _covered(row: Row) -> str:

@@ -24,6 +24,7 @@ from feelahead.lab.sweep import Question, Sweep
 from feelahead.lab.table import Row, Table
 from feelahead.printing.figures import shown
 from operator_side.people.settings import PersonSettings
+from robot_side.depth.camera_settings import Perception
 from robot_side.drivers.mujoco.built_in_scenes import SceneName
 from robot_side.laws.named import LAWS
 from robot_side.laws.paper_settings import PaperFlags
@@ -62,6 +63,8 @@ class HapticsSettings(PaperFlags, Sweep):
     """Probability P of the law (eq. 10)."""
     link_model: LinkModel = "datagram"
     """datagram: messages may be lost and reordered. stream: messages stay in order and losses delay them."""
+    perception: Annotated[Perception, tyro.conf.arg(metavar="{objects,depth}")] = "objects"
+    """What is perceived: the objects themselves, with the camera's error, or surfaces that two depth cameras see."""
     duration: Annotated[float, Meta(gt=0.0, lt=1e4), tyro.conf.arg(metavar="SECONDS")] = 45.0
     """Maximum duration of each trial, in virtual time."""
     person: Annotated[PersonSettings, tyro.conf.Suppress] = field(default_factory=lambda: MISJUDGES_DEPTH)
@@ -110,6 +113,7 @@ def cells(settings: HapticsSettings) -> Iterator[Cell]:
                 probability=settings.probability,
                 law=law,
                 paper=settings.paper,
+                by_depth=settings.perception == "depth",
             ),
         )
 
