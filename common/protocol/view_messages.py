@@ -29,6 +29,7 @@ _POSE_BYTES: Final = 7 * 4
 _SPHERE_BYTES: Final = 4 * 4
 _THREE_BYTES: Final = 3 * 4
 """A vertex, and a triangle"""
+_SURFACE_BYTES: Final = 10 * 4
 
 
 class VideoFrame(Message, frozen=True, tag="video"):
@@ -186,8 +187,17 @@ class SceneState(Message, frozen=True, tag="scene"):
     tick_p99_us: float
     overruns: int
     near: Near | None = None
+    surfaces: bytes | None = None
+    """(s, 10) float32: centre, quaternion w, x, y, z and half sizes of the boxes that depth cameras see, which replace
+    those of an earlier message; None: they stay. Sent once a second, or less often over a slow link"""
+    surface_roles: bytes = b""
+    """(s,) uint8: roles of the surfaces, as in `roles`"""
 
     def __post_init__(self) -> None:
+        if len(self.surfaces or b"") != _SURFACE_BYTES * len(self.surface_roles):
+            raise ValueError(
+                f"surfaces has {len(self.surfaces or b'')} bytes; valid: {_SURFACE_BYTES} for each of surface_roles"
+            )
         if len(self.link_poses) % _POSE_BYTES or len(self.spheres) % _SPHERE_BYTES:
             raise ValueError(
                 f"link_poses or spheres ends within a row; valid: whole rows of {_POSE_BYTES} and {_SPHERE_BYTES} bytes"

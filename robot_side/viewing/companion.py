@@ -19,8 +19,8 @@ from common.companion.process import companion_channel
 from common.protocol.codec import VIEW_MAXIMUM_BYTES
 from common.protocol.view_messages import ViewName
 from common.realtime.priority import lower_priority
+from robot_side.drivers.mujoco.drawing.off_screen import BACKENDS, REMEDY, silenced, trouble_with
 from robot_side.viewing.exchange import Order, Picture, Ready, Refusal, Setup, Undecodable, decode_to_companion, encode
-from robot_side.viewing.off_screen import BACKENDS, REMEDY, silenced, trouble_with
 
 if TYPE_CHECKING:
     from robot_side.viewing.h264 import H264

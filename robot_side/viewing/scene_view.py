@@ -22,6 +22,7 @@ from robot_side.tick.outgoing import SHOWN_NAME
 from robot_side.tick.sensed import Sensed
 from robot_side.tick.situation import Situation
 from robot_side.viewing.shapes import SceneModel, bytes_of
+from robot_side.viewing.surfaces import seen_surfaces
 
 _TRIGGERS: Final[tuple[Trigger, Trigger]] = ("l2", "r2")
 _FEW: Final = 64
@@ -32,6 +33,9 @@ _ENTRY_BYTES: Final = 40
 """Bytes of an object in a message, besides its name and its shapes"""
 _SHAPES_AT_ONCE: Final = 16
 _OVERLAPS_PERIOD_S: Final = 0.1 - 1e-9
+_SURFACES_PERIOD_S: Final = 1.0 - 1e-9
+SURFACES_BYTES_PER_S: Final = 50_000.0
+"""Most bytes of surfaces in a second"""
 
 
 @dataclass
@@ -43,7 +47,7 @@ class TickFigures:
     overruns: int = 0
 
 
-@dataclass(frozen=True)
+@dataclass
 class _Begun:
     """Content of a SceneState that is being made."""
 
@@ -54,6 +58,7 @@ class _Begun:
     link_poses: bytes
     object_index: IntArray
     object_poses: bytes
+    surfaces: tuple[bytes | None, bytes] = None, b""
     terms: dict[Trigger, EnlargementTerms] = field(default_factory=dict)
     overlaps_m3: dict[Trigger, Overlaps] = field(default_factory=dict)
 
@@ -82,7 +87,8 @@ class SceneView:
         self._law, self._enlarged = law, enlarged
         self._overlaps_m3: dict[Trigger, Overlaps] = {}
         """Newest overlaps along each trigger, which several messages tell"""
-        self._next_overlaps_s = -math.inf
+        self._next_overlaps_s = self._next_surfaces_s = -math.inf
+        self._surfaces_bytes_per_s = SURFACES_BYTES_PER_S
         self._surroundings = surroundings
         self._eyes: dict[ViewName, Eye | None] = {"first_person": eye, "overview": overview_eye}
         self._links: tuple[tuple[Shape, ...], int] | None = None
@@ -121,12 +127,19 @@ class SceneView:
                 return True
         return False
 
-    def begin_state(self, sensed: Sensed, situation: Situation, taken_s: float) -> None:
+    def begin_state(
+        self,
+        sensed: Sensed,
+        situation: Situation,
+        taken_s: float,
+        surfaces_bytes_per_s: float = SURFACES_BYTES_PER_S,
+    ) -> None:
         """Begin a SceneState of the newest tick, which was at `taken_s` with the results `sensed` and `situation`."""
         links = _row_bytes(self._kinematics.body_poses(self._model.bodies))
-        index = self._moved(situation.objects)
-        poses = object_poses(situation.objects, index)
+        index, first = self._moved(situation.objects), self._model.surfaces
+        poses = object_poses(situation.objects, first + index)
         self._begun = _Begun(sensed, situation, taken_s, self.version, links, index, _row_bytes(poses))
+        self._surfaces_bytes_per_s = surfaces_bytes_per_s
         if taken_s < self._next_overlaps_s:
             self._begun.overlaps_m3.update(self._overlaps_m3)
         else:
@@ -139,6 +152,11 @@ class SceneView:
         """
         begun = self._begun
         if begun is None:
+            return None
+        if self._model.surfaces and begun.taken_s >= self._next_surfaces_s:
+            begun.surfaces = seen, roles = seen_surfaces(begun.situation.objects, self._model.surfaces)
+            period_s = max(_SURFACES_PERIOD_S, (len(seen) + len(roles)) / self._surfaces_bytes_per_s)
+            self._next_surfaces_s = begun.taken_s + period_s
             return None
         for trigger in _TRIGGERS:
             if trigger not in begun.terms:
@@ -154,7 +172,7 @@ class SceneView:
 
     def _state(self, header: Header, begun: "_Begun", ticks: TickFigures) -> SceneState:
         objects, pose = begun.situation.objects, begun.situation.pose
-        l2_m3, r2_m3 = begun.overlaps_m3["l2"], begun.overlaps_m3["r2"]
+        l2_m3, r2_m3, first = begun.overlaps_m3["l2"], begun.overlaps_m3["r2"], self._model.surfaces
         return SceneState(
             header,
             version=begun.version,
@@ -162,11 +180,13 @@ class SceneView:
             link_poses=begun.link_poses,
             object_index=begun.object_index.astype("<u4").tobytes(),
             object_poses=begun.object_poses,
-            roles=bytes(map(ROLES.index, objects.roles)),
+            roles=bytes(map(ROLES.index, objects.roles[first:])),
             tool_pose=_pose(pose.tool_position_m, pose.tool_rotation),
             spheres=_row_bytes(np.column_stack([pose.sphere_centers_m, pose.sphere_radii_m])),
             overlaps=tuple(
-                (thing, l2_m3.get(thing, 0.0), r2_m3.get(thing, 0.0)) for thing in sorted(l2_m3.keys() | r2_m3.keys())
+                (thing - first, l2_m3.get(thing, 0.0), r2_m3.get(thing, 0.0))
+                for thing in sorted(l2_m3.keys() | r2_m3.keys())
+                if thing >= first
             ),
             l2=begun.terms["l2"],
             r2=begun.terms["r2"],
@@ -174,6 +194,8 @@ class SceneView:
             tick_p99_us=ticks.p99_us,
             overruns=ticks.overruns,
             near=self._near(begun.situation),
+            surfaces=begun.surfaces[0],
+            surface_roles=begun.surfaces[1],
         )
 
     def _near(self, situation: Situation) -> Near:
@@ -187,8 +209,9 @@ class SceneView:
 
     def _moved(self, objects: PerceivedObjects) -> IntArray:
         """Return the indices of the objects whose poses must be sent."""
-        if len(objects.names) <= _FEW:
-            return np.arange(len(objects.names))
+        count = len(objects.names) - self._model.surfaces
+        if count <= _FEW or self._model.surfaces:
+            return np.arange(count)
         if self._base is None:
             return self._model.may_move
         (positions_m, rotations), (at_first_m, turned_first) = _frames(objects), _frames(self._base)
@@ -209,7 +232,7 @@ class SceneView:
                 yield
             links = tuple(made)
             self._links = links, room
-        poses = object_poses(objects, np.arange(len(objects.names)))
+        poses = object_poses(objects, np.arange(model.surfaces, len(objects.names)))
         room -= sum(len(name) + _ENTRY_BYTES for name in model.objects)
         shapes, left_out = list(links), 0
         distances_m = np.linalg.norm(poses[:, :3] - tool_m, axis=1)

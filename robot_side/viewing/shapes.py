@@ -33,6 +33,9 @@ IN_PLACE: Final = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
 class SceneModel:
     """Links and objects of a scene, and their shapes in their own frames."""
 
+    surfaces = 0
+    """Number of objects, the first ones of each frame, that are surfaces which come and go: they have no shapes"""
+
     def __init__(self, scene: Scene, fixed: PerceivedObjects | None = None) -> None:
         """fixed: objects that each frame has behind the scene's own; of these, boxes are drawn."""
         model, robot = scene.model, scene.robot

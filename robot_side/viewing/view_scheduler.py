@@ -14,7 +14,7 @@ from robot_side.tick.outgoing import Outgoing, OutgoingStream
 from robot_side.tick.sensed import Sensed
 from robot_side.tick.situation import Situation
 from robot_side.viewing.pictures import Cameras
-from robot_side.viewing.scene_view import SceneView, TickFigures
+from robot_side.viewing.scene_view import SURFACES_BYTES_PER_S, SceneView, TickFigures
 
 SCENE_PERIOD_S: Final = 1.0 / 30.0
 SHAPES_PERIOD_S: Final = 3.0
@@ -212,7 +212,8 @@ class ViewScheduler:
         if is_due and self._room.backlog_s("scene", now_s) > _BACKLOG_S:
             self._counts["scene"]["behind"] += 1
         elif is_due:
-            view.begin_state(sensed, situation, taken_s)
+            surfaces_bytes_per_s = min(SURFACES_BYTES_PER_S, _SHAPES_SHARE * self._room.left_bit_s / 8.0)
+            view.begin_state(sensed, situation, taken_s, surfaces_bytes_per_s)
             return []
         state = view.work_on_state(lambda: session.shown_header(now_s), self._ticks)
         if state is None:

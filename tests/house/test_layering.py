@@ -47,27 +47,37 @@ ARROWS = """
     robot_side/overlap: common robot_side/compiled robot_side/overlap/checks robot_side/overlap/meshes
         robot_side/overlap/precise robot_side/overlap/solids
     robot_side/surroundings/kinds: common robot_side/compiled robot_side/overlap/meshes robot_side/overlap/solids
-    robot_side/surroundings: common common/files robot_side/compiled robot_side/overlap/meshes
+    robot_side/surroundings: common robot_side/compiled robot_side/overlap/meshes
         robot_side/surroundings/kinds
     robot_side/field: common robot_side/arm robot_side/compiled robot_side/enlargement robot_side/surroundings
         robot_side/surroundings/kinds
     robot_side/depth: common robot_side/compiled robot_side/surroundings robot_side/surroundings/kinds
     robot_side/depth/surfel_map: common robot_side/compiled robot_side/depth
     robot_side/depth/octree: common robot_side/compiled robot_side/depth robot_side/depth/surfel_map
-    robot_side/depth/depth_map.py: robot_side/depth robot_side/depth/octree robot_side/depth/surfel_map
+    robot_side/depth/pointing.py: common robot_side/depth robot_side/depth/surfel_map
+    robot_side/depth/depth_map.py: common robot_side/depth robot_side/depth/octree robot_side/depth/pointing.py
+        robot_side/depth/surfel_map
+    robot_side/depth/perception.py: common robot_side/depth robot_side/depth/depth_map.py
     robot_side/gripper: common common/files robot_side/arm robot_side/overlap/meshes robot_side/surroundings
     robot_side/tick: common common/protocol robot_side/arm robot_side/surroundings
-    robot_side/commissioning: common common/command common/sockets/door robot_side/arm robot_side/drivers/mujoco
-        robot_side/drivers/remote robot_side/parts.py robot_side/settings.py
+    robot_side/commissioning: common common/command common/sockets/door robot_side/arm robot_side/compiled
+        robot_side/depth robot_side/depth/perception.py robot_side/drivers/mujoco
+        robot_side/drivers/mujoco/depth_cameras robot_side/drivers/mujoco/drawing robot_side/drivers/remote
+        robot_side/parts.py robot_side/perceiving robot_side/settings.py
     robot_side/drivers/remote: common common/protocol common/sockets/door common/timing robot_side/arm robot_side/depth
         robot_side/overlap/meshes
         robot_side/surroundings
     robot_side/laws: common common/files common/protocol robot_side/arm robot_side/enlargement robot_side/field
         robot_side/laws/paper_settings.py robot_side/surroundings robot_side/tick
-    robot_side/depth: common
-    robot_side/drivers/mujoco: common common/files common/protocol robot_side/arm robot_side/compiled
-        robot_side/depth robot_side/gripper robot_side/overlap/meshes robot_side/surroundings
+    robot_side/drivers/mujoco: common common/files common/protocol robot_side/arm robot_side/compiled robot_side/gripper
+        robot_side/overlap/meshes robot_side/surroundings
         robot_side/surroundings/kinds robot_side/tick/truth.py
+    robot_side/drivers/mujoco/depth_cameras: common robot_side/depth robot_side/depth/perception.py
+        robot_side/drivers/mujoco robot_side/drivers/mujoco/drawing robot_side/surroundings robot_side/tick
+    robot_side/perceiving: common common/companion common/files common/realtime common/sockets/door robot_side/arm
+        robot_side/compiled robot_side/depth robot_side/depth/perception.py robot_side/drivers/mujoco
+        robot_side/drivers/mujoco/depth_cameras robot_side/drivers/mujoco/drawing robot_side/drivers/remote
+        robot_side/settings.py robot_side/surroundings robot_side/tick
     robot_side/reporting: common common/emulation common/protocol common/rate common/sockets common/sockets/door
         robot_side/arm
         robot_side/operators robot_side/tick
@@ -81,17 +91,18 @@ ARROWS = """
         robot_side/tick
     robot_side/viewing: common common/companion common/protocol common/realtime robot_side/drivers/mujoco
         robot_side/drivers/mujoco/drawing robot_side/operators robot_side/surroundings robot_side/tick
-    robot_side/settings.py: common common/command common/files robot_side/arm robot_side/drivers/mujoco
+    robot_side/settings.py: common common/command common/files robot_side/arm robot_side/depth robot_side/drivers/mujoco
         robot_side/enlargement robot_side/laws/named.py robot_side/laws/paper_settings.py robot_side/operators
         robot_side/viewing
     robot_side/parts.py: common common/protocol common/timing robot_side/arm robot_side/compiled
         robot_side/core robot_side/laws
         robot_side/drivers/mujoco robot_side/drivers/mujoco/checks robot_side/drivers/remote robot_side/gripper
-        robot_side/laws/named.py robot_side/operators robot_side/settings.py robot_side/surroundings
+        robot_side/laws/named.py robot_side/operators robot_side/perceiving robot_side/settings.py
+        robot_side/surroundings
     robot_side: common common/command common/emulation common/files common/loop common/protocol common/recording
         common/sockets/door common/status robot_side/arm robot_side/commissioning robot_side/compiled robot_side/core
-        robot_side/drivers/mujoco robot_side/drivers/remote robot_side/parts.py robot_side/recording
-        robot_side/reporting robot_side/settings.py robot_side/tick robot_side/viewing
+        robot_side/drivers/mujoco robot_side/drivers/remote robot_side/parts.py robot_side/perceiving
+        robot_side/recording robot_side/reporting robot_side/settings.py robot_side/tick robot_side/viewing
 
     operator_side/controller: common common/status
     operator_side/dualsense/effects: operator_side/controller
@@ -137,7 +148,7 @@ ARROWS = """
     feelahead/printing: common
     feelahead/lab: common/* robot_side/* operator_side/* feelahead/both_sides feelahead/containers feelahead/printing
     feelahead/commands/bench_and_try.py: common common/files feelahead/lab
-    feelahead/commands: common/* robot_side/commissioning robot_side/compiled robot_side/drivers/mujoco
+    feelahead/commands: common/* robot_side/commissioning robot_side/compiled robot_side/depth robot_side/drivers/mujoco
         robot_side/laws/named.py robot_side/laws/paper_settings.py robot_side/settings.py robot_side/viewing
         operator_side/* feelahead/both_sides feelahead/printing feelahead/recordings
     feelahead: common/*
@@ -180,6 +191,7 @@ LIBRARIES = {
         "common/recording",
         "common/loop",
         "robot_side/viewing",
+        "robot_side/perceiving",
         "robot_side/compiled/warm_up.py",
         "robot_side/gripper/kept_covers.py",
         "operator_side/viewing/terminal",
@@ -192,7 +204,7 @@ LIBRARIES = {
 """Rooms and files that may import each library, or use a clock"""
 
 
-PLAN = {"common": (29, 53, 7), "robot_side": (24, 85, 11), "operator_side": (20, 70, 9)}
+PLAN = {"common": (29, 53, 7), "robot_side": (25, 99, 12), "operator_side": (20, 70, 9)}
 """Most rooms, arrows and floors of a package. Here each file or folder directly in the package is a room.
 
 Arrow: some file of one room imports a file of the other. Floors: rooms in the longest chain of arrows.

@@ -88,7 +88,7 @@ def robot_arguments(
     config = "--permit-tuning" if settings.robot_config is None else f"--config={settings.robot_config}"
     watched = ["--cameras.at-once"] if settings.has_pages else []
     of_law = "probability", "assist", "law", "law_paper_share", "enlargement"
-    own = _flags(settings, given, *_SHARED, "scene", "model", "site", "site_axis", *of_law)
+    own = _flags(settings, given, *_SHARED, "scene", "perception", "model", "site", "site_axis", *of_law)
     ports = f"--bind={listening['control']}", f"--view-bind={listening['view']}"
     return [*_files(settings, summary), *ports, config, *watched, *own]
 

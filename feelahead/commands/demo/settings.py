@@ -33,6 +33,8 @@ class DemoSettings(PaperFlags, RunOptions):
     """Objects around the built-in arm's target. table: a cluttered table (default). wall: a wall 10 to 60 mm behind the
     target. slot: two posts in front of the target, with 15 to 40 mm to spare on each side. shelf: the target stands on
     a shelf with a raised front edge. The exact sizes of the last three are drawn from the seed."""
+    perception: Annotated[Literal["depth"] | None, tyro.conf.arg(metavar="depth")] = None
+    """depth: simulated depth cameras see the surfaces, which nobody models (docs/depth.md)."""
     duration: Annotated[float | None, tyro.conf.arg(metavar="SECONDS")] = None
     """Duration of the run, counted from when the link is up. Unless given, the run ends 5 s after the last page of the
     console was closed, or after 60 s without a page. Where no page can open (--no-console, --tui, or output that is no

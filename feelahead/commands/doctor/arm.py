@@ -40,21 +40,18 @@ class ArmDoctorSettings(RobotSettings):
 
 def check_arm(arguments: Sequence[str]) -> int:
     """Run the checklist; return the exit code: 0 if nothing is wrong."""
-    following = [*arguments[1:], "--"]
-    bare = [word == "--arm" and after.startswith("--") for word, after in zip(arguments, following, strict=True)]
-    given = [word for word, has_no_address in zip(arguments, bare, strict=True) if not has_no_address]
-    settings = parse_settings(ArmDoctorSettings, "feelahead doctor", given)
+    settings = parse_settings(ArmDoctorSettings, "feelahead doctor", without_bare("--arm", arguments))
     if settings.arm is None:
         raise ConfigurationError("--arm: has no address; valid: tcp://HOST:PORT, or [arm] address in the --config file")
-    say = _say_aside if settings.json else _say
+    tell = say_aside if settings.json else say
     findings: list[Finding] = []
     unseen: list[str] = []
     console = Console(file=sys.stdout, highlight=False)
-    with arm_alone(settings, say) as alone:
+    with arm_alone(settings, tell) as alone:
         one = dataclasses.replace(alone, aside=settings.json)
-        say("each joint moves by 2° (5 mm where it slides) and back; keep a hand on the emergency stop")
+        tell("each joint moves by 2° (5 mm where it slides) and back; keep a hand on the emergency stop")
         if not settings.yes and one.answer("type yes to begin:") != "yes":
-            say("nothing was moved")
+            tell("nothing was moved")
             return 1
 
         def ask(question: str) -> bool:
@@ -65,35 +62,46 @@ def check_arm(arguments: Sequence[str]) -> int:
 
         try:
             for check in run_checks(one, ask, None if settings.block_mm is None else 1e-3 * settings.block_mm):
-                findings.append(_finding(check, "; nobody looked" if unseen else ""))
+                findings.append(finding_of(check, "; nobody looked" if unseen else ""))
                 unseen.clear()
                 if not settings.json:
-                    _show(console, findings[-1])
+                    show(console, findings[-1])
         except ProcedureError as error:
             findings.append(Finding("checklist", Verdict.MISSING, f"ended: {error}"))
             if not settings.json:
-                _show(console, findings[-1])
+                show(console, findings[-1])
     if settings.json:
         found = [dataclasses.asdict(finding) for finding in findings]
         sys.stdout.write(json.dumps({"findings": found, "unseen": settings.yes}, indent=2) + "\n")
     return 1 if any(finding.verdict is Verdict.MISSING for finding in findings) else 0
 
 
-def _finding(check: Check, also: str) -> Finding:
+def without_bare(flag: str, arguments: Sequence[str]) -> list[str]:
+    """Return the arguments without a flag that has no value: its address is in the --config file."""
+    following = [*arguments[1:], "--"]
+    bare = [word == flag and after.startswith("--") for word, after in zip(arguments, following, strict=True)]
+    return [word for word, has_no_address in zip(arguments, bare, strict=True) if not has_no_address]
+
+
+def finding_of(check: Check, also: str = "") -> Finding:
+    """Return the finding of a check. also: ends what was found."""
     verdict = Verdict.NOTE if check.good is None else Verdict.OK if check.good else Verdict.MISSING
     return Finding(check.name, verdict, check.said + also, check.remedy)
 
 
-def _show(console: Console, finding: Finding) -> None:
+def show(console: Console, finding: Finding) -> None:
+    """Print a finding as one line."""
     line = Text(f"{finding.name}: ").append(finding.verdict.value, COLOURS[finding.verdict])
     line.append(f"  {finding.said}" + ("" if finding.remedy is None else f"; look at: {finding.remedy}"))
     console.print(line, soft_wrap=True)
 
 
-def _say(text: str) -> None:
+def say(text: str) -> None:
+    """Print a line at once."""
     sys.stdout.write(f"{text}\n")
     sys.stdout.flush()
 
 
-def _say_aside(text: str) -> None:
+def say_aside(text: str) -> None:
+    """Print a line beside the output."""
     sys.stderr.write(f"{text}\n")

@@ -45,6 +45,10 @@ class DoctorSettings:
     moves by 2 degrees and back. All flags of feelahead-robot that describe the arm are valid; the address may be in the
     --config file. See: feelahead doctor --arm --help, and docs/real-arm.md.
 
+    With --depth or --perception depth: look at the pictures of depth cameras for some seconds. The report says how many
+    come, their age, their holes, whether the mount fits the arm, and how thin a rod is felt. Exit code 1 if one is bad.
+    See: feelahead doctor --depth --help, and docs/depth.md.
+
     With --compile: compile the kernels of all scenes for this machine's processor now, instead of at the first start.
     This takes half a minute or more. The machine code is kept in $NUMBA_CACHE_DIR, else in
     ~/.cache/feelahead/kernels; kernels that are already there stay. Exit code 1 if the folder cannot be written.
@@ -56,6 +60,10 @@ class DoctorSettings:
     """Compile the robot side's kernels now."""
     arm: Annotated[str | None, tyro.conf.arg(metavar="[tcp://HOST:PORT]")] = None
     """Go through the checklist of an arm whose driver connects at this address."""
+    depth: Annotated[str | None, tyro.conf.arg(metavar="[tcp://HOST:PORT]")] = None
+    """Look at the pictures of a process that connects at this address."""
+    perception: Annotated[str | None, tyro.conf.arg(metavar="depth")] = None
+    """depth: look at the pictures of the simulated depth cameras."""
     connect: Annotated[str | None, tyro.conf.arg(metavar="tcp://HOST:PORT")] = None
     """Check the path to a robot side at this address."""
     path: bool = True
@@ -79,9 +87,14 @@ class DoctorSettings:
 
 def doctor(arguments: Sequence[str]) -> int:
     """Run the checks that the arguments ask for, and print the result; return the exit code."""
-    if any(argument.partition("=")[0] == "--arm" for argument in arguments):
+    given = {argument.partition("=")[0] for argument in arguments}
+    if asked := [flag for flag in ("--depth", "--perception", "--arm") if flag in given]:
         if missing := machine.failed_imports("robot"):
-            raise ConfigurationError(f"--arm needs the extra robot, which lacks {', '.join(missing)}")
+            raise ConfigurationError(f"{asked[0]} needs the extra robot, which lacks {', '.join(missing)}")
+        if asked != ["--arm"]:
+            from feelahead.commands.doctor.depth import check_depth  # noqa: PLC0415  # it has no MuJoCo
+
+            return check_depth(arguments)
         from feelahead.commands.doctor.arm import check_arm  # noqa: PLC0415  # an operator machine has no MuJoCo
 
         return check_arm(arguments)

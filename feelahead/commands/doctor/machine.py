@@ -13,7 +13,7 @@ from rich.progress import Progress
 
 from common.errors import ConfigurationError
 from feelahead.commands.doctor.finding import Finding, Verdict
-from robot_side.viewing.off_screen import BACKENDS, REMEDY
+from robot_side.drivers.mujoco.drawing.off_screen import BACKENDS, REMEDY
 
 if TYPE_CHECKING:
     from robot_side.compiled.kernel import Compiled
@@ -33,7 +33,7 @@ COMPILE: Final = "feelahead doctor --compile"
 _LIMIT_S: Final = 60.0
 _RENDER: Final = """
 import json, sys
-from robot_side.viewing.off_screen import trouble_with
+from robot_side.drivers.mujoco.drawing.off_screen import trouble_with
 print(json.dumps(trouble_with(sys.argv[1])))
 """
 _REALTIME: Final = "import json; from common.realtime.priority import make_realtime; print(json.dumps(make_realtime()))"

@@ -7,6 +7,7 @@ import numpy as np
 from common.protocol.view_messages import Eye, SceneShapes, SceneState, Shape
 from common.roles import ROLES, Role
 from operator_side.viewing.console.outlines import Floats, corners_m, moved, outline, rotation, seen
+from operator_side.viewing.console.seen_surfaces import SeenSurfaces
 from operator_side.viewing.console.solids import solid_of
 
 _STILL: Final = np.array((0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0))
@@ -57,6 +58,7 @@ class Cues:
         self._poses: Floats = np.zeros((0, 7))
         self._own: dict[int, list[Shape]] = {}
         self._bodies: dict[int, _Body] = {}
+        self._surfaces = SeenSurfaces()
 
     def shapes(self, shapes: SceneShapes) -> None:
         """Take the shapes; their objects rest until a state moves them."""
@@ -72,6 +74,7 @@ class Cues:
 
     def of(self, state: SceneState) -> dict[str, Any]:
         """Return the page's `target`, `drop` and `tool`, the gripper's point in each view; each None if unknown."""
+        self._surfaces.take(state)
         shapes = self._shapes
         if shapes is None or shapes.version != state.version:
             return {"target": None, "drop": None, "tool": None}
@@ -90,14 +93,20 @@ class Cues:
         """Return the target's name, its outline in each view, and the way of its centre: right, up and ahead."""
         role = ROLES.index(Role.TARGET)
         target = state.roles.index(role) if role in state.roles else len(self._poses)
-        if target not in self._own:
+        seen_m = self._surfaces.target_corners_m() if target not in self._own else None
+        if target not in self._own and seen_m is None:
             return None
-        corners = self._body(target).corners
+        corners = self._body(target).corners if seen_m is None else seen_m
         centre = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
-        placed = moved(self._poses[target], np.vstack((centre, corners)))
+        placed = np.vstack((centre, corners))
+        placed = moved(self._poses[target], placed) if seen_m is None else placed
         right, down, ahead = ((placed[0] - tool[:3]) @ rotation(tool)).tolist()
         boxes = [None if eye is None else outline(placed[1:], frame, eye) for eye, frame in eyes]
-        return {"name": shapes.objects[target], "boxes": boxes, "way_m": (right, -down, ahead)}
+        return {
+            "name": shapes.objects[target] if seen_m is None else "target",
+            "boxes": boxes,
+            "way_m": (right, -down, ahead),
+        }
 
     def _drop(self, shapes: SceneShapes, state: SceneState, tool: Floats, eyes: "_Eyes") -> dict[str, Any] | None:
         """Return what lies below the gripper's point, how far below it or what is held, and the line in each view."""
@@ -106,6 +115,8 @@ class Cues:
         for owner in self._own.keys() - ({shapes.objects.index(held)} if held in shapes.objects else set()):
             if (far_m := self._body(owner).top_below_m(point, self._poses[owner])) is not None:
                 below.append((far_m, shapes.objects[owner]))
+        if (far_m := self._surfaces.top_below_m(point, with_target=held is None)) is not None:
+            below.append((far_m, "a surface"))
         if not below:
             return None
         far_m, name = min(below)

@@ -13,7 +13,7 @@ from viser.transforms import SO3
 
 from common.protocol.view_messages import SceneShapes, SceneState, Shape
 from common.roles import ROLES, Role
-from operator_side.viewing.console.solids import Solid, solid_of, sphere
+from operator_side.viewing.console.solids import Solid, box, solid_of, sphere
 
 Floats = NDArray[np.float64]
 """Array of float64; a pose is a row of x, y, z and the quaternion w, x, y, z"""
@@ -35,6 +35,14 @@ _MOST_MESHES: Final = 2000
 """Maximum number of meshes from which on capsules and meshes are no longer drawn: each takes milliseconds"""
 _GONE: Final = 1e-6
 """Scale that makes a shape invisible"""
+_SURFACES_ROOM: Final = 256
+"""Surfaces by which a batch grows, so that it is seldom made anew"""
+_SURFACE_COLORS: Final = {
+    Role.OBSTACLE: (130, 130, 140),
+    Role.TARGET: (204, 121, 167),
+    Role.SUPPORT: (190, 178, 150),
+    Role.IGNORED: (215, 215, 215),
+}
 
 
 def compose(outer: Floats, inner: Floats) -> Floats:
@@ -123,6 +131,37 @@ class _Ghost:
         self._radii = radii
 
 
+class _Surfaces:
+    """Boxes that depth cameras see, coloured by their roles."""
+
+    def __init__(self, scene: viser.SceneApi) -> None:
+        self._scene = scene
+        self._handle: viser.BatchedMeshHandle | None = None
+        self._room = 0
+
+    def draw(self, state: SceneState) -> None:
+        """Draw the surfaces of a state; those of an earlier one stay if it has none."""
+        if state.surfaces is None:
+            return
+        rows = np.frombuffer(state.surfaces, np.float32).reshape(-1, 10)
+        roles = np.minimum(np.frombuffer(state.surface_roles, np.uint8), len(ROLES) - 1)
+        if self._handle is None or self._room < len(rows):
+            if self._handle is not None:
+                self._handle.remove()
+            self._room = _SURFACES_ROOM * max(1, -(-len(rows) // _SURFACES_ROOM))
+            looks = {
+                "batched_scales": np.full(self._room, _GONE),
+                "batched_colors": np.zeros((self._room, 3), np.uint8),
+            }
+            self._handle = _add(self._scene, "/surfaces", box(), np.zeros((self._room, 3)), **looks)
+        drawn = np.tile(np.array((*_STILL, _GONE, _GONE, _GONE), np.float32), (self._room, 1))
+        drawn[: len(rows)] = rows
+        colors = np.zeros((self._room, 3), np.uint8)
+        colors[: len(rows)] = np.array([_SURFACE_COLORS[role] for role in ROLES], np.uint8)[roles]
+        self._handle.batched_positions, self._handle.batched_wxyzs = drawn[:, :3], drawn[:, 3:7]
+        self._handle.batched_scales, self._handle.batched_colors = drawn[:, 7:], colors
+
+
 class Drawing:
     """The newest scene, drawn in viser."""
 
@@ -131,6 +170,7 @@ class Drawing:
         self._shapes: SceneShapes | None = None
         self._batches: list[_Batch] = []
         self._objects: Floats = np.zeros((0, 7))
+        self._surfaces = _Surfaces(server.scene)
         self._label: viser.LabelHandle | None = None
         self._looked = False
         self._ghosts = (
@@ -182,6 +222,7 @@ class Drawing:
         with self._server.atomic():
             for batch in self._batches:
                 batch.move(links, self._objects, tints)
+            self._surfaces.draw(state)
             self._place_label(shapes, roles)
             spheres = np.frombuffer(state.spheres, np.float32).reshape(-1, 4)
             along: Floats = SO3(np.array(state.tool_pose[3:])).apply(np.array([0.0, 0.0, 1.0])).astype(np.float64)

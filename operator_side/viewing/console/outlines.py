@@ -10,7 +10,8 @@ from common.protocol.view_messages import Eye, Shape
 Floats = NDArray[np.float64]
 Box = tuple[float, float, float, float]
 """Left, lower, right and upper edge, in half heights of the picture from its centre; right and up are positive"""
-_SIGNS: Final = np.array(np.meshgrid(*[[-1.0, 1.0]] * 3)).reshape(3, -1).T
+SIGNS: Final = np.array(np.meshgrid(*[[-1.0, 1.0]] * 3)).reshape(3, -1).T
+"""(8, 3) corners of a box with half sizes of 1"""
 _NEAREST_M: Final = 0.005
 """Least distance before the eye; a corner behind it has no place in the picture"""
 
@@ -25,7 +26,7 @@ def corners_m(shape: Shape) -> Floats:
     else:
         half = {"sphere": (x, x, x), "cylinder": (x, x, y), "capsule": (x, x, x + y)}.get(shape.kind, (x, y, z))
         low, high = -np.array(half), np.array(half)
-    box = 0.5 * (low + high) + 0.5 * _SIGNS * (high - low)
+    box = 0.5 * (low + high) + 0.5 * SIGNS * (high - low)
     return moved(np.array(shape.pose), box)
 
 

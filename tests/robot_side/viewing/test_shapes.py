@@ -50,6 +50,10 @@ def shapes_of(robot: RobotSide, view: SceneView) -> SceneShapes:
 
 def state_of(view: SceneView, sensed: Sensed, situation: Situation) -> SceneState:
     view.begin_state(sensed, situation, 0.0)
+    return finished(view)
+
+
+def finished(view: SceneView) -> SceneState:
     while (state := view.work_on_state(lambda: HEADER, TickFigures())) is None:
         pass
     return state

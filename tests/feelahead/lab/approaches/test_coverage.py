@@ -97,7 +97,7 @@ def test_moving_objects_are_touched_where_they_are_by_then(speed_m_s: float) -> 
     along_m = np.interp(touch_s, replay.record.pose_time_s, replay.along_m)
     assert along_m == pytest.approx(0.22 + speed_m_s * since_s, abs=0.001)
     then = replace(draw, speed_m_s=speed_m_s).objects_at(replay.record.began_s + 1.0)
-    moved_m = then.box_centers_m - draw.objects.box_centers_m
+    moved_m = then.box_centers_m - draw.objects_at(replay.record.began_s).box_centers_m
     np.testing.assert_allclose(moved_m, [speed_m_s * replay.axis], atol=0.034 * abs(speed_m_s))
     assert then.velocities_m_s is not None
     np.testing.assert_allclose(then.velocities_m_s, [speed_m_s * replay.axis])

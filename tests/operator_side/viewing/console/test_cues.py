@@ -85,3 +85,52 @@ def test_unknown_eyes_leave_the_figures() -> None:
     now = decode_view(state(0.0))
     assert isinstance(now, SceneState)
     assert Cues().of(now) == {"target": None, "drop": None, "tool": None}
+
+
+def seen_by_depth(tool_m: tuple[float, float, float], held: str | None = None) -> dict[str, Any]:
+    """Return the cues of a table at 0, a target's top at 0.1 m, and a board that stands on an edge."""
+    upright = (np.sqrt(0.5), 0.0, np.sqrt(0.5), 0.0)
+    rows = [
+        ((0.5, 0.0, -0.01), (1.0, 0.0, 0.0, 0.0), (0.4, 0.4, 0.01)),
+        ((0.6, 0.0, 0.09), (1.0, 0.0, 0.0, 0.0), (0.05, 0.03, 0.01)),
+        ((0.6, 0.2, 0.1), upright, (0.2, 0.05, 0.01)),
+    ]
+    surfaces = np.array([[*center, *turn, *half] for center, turn, half in rows], "<f4").tobytes()
+    made, now = decode_view(shapes()), decode_view(state(0.0))
+    assert isinstance(made, SceneShapes)
+    assert isinstance(now, SceneState)
+    cues = Cues()
+    cues.shapes(msgspec.structs.replace(made, objects=(), shapes=(), eye=AHEAD, overview_eye=ABOVE))
+    without = {"roles": b"", "object_index": b"", "object_poses": b"", "tool_pose": (*tool_m, *ALONG_X)}
+    now = msgspec.structs.replace(now, near=Near(held=held), **without)
+    cues.of(msgspec.structs.replace(now, surfaces=surfaces, surface_roles=bytes((2, 1, 0))))
+    return dict(msgspec.json.decode(msgspec.json.encode(cues.of(now))))
+
+
+@pytest.mark.parametrize(
+    ("tool_m", "held", "height_m"),
+    [
+        ((0.4, 0.0, 0.2), None, 0.2),
+        ((0.6, 0.0, 0.2), None, 0.1),
+        ((0.6, 0.0, 0.2), "surface 4", 0.2),
+        ((0.605, 0.2, 0.5), None, 0.2),
+        ((0.62, 0.2, 0.5), None, 0.5),
+    ],
+)
+def test_the_height_over_surfaces_is_that_over_the_next_one(
+    tool_m: tuple[float, float, float], held: str | None, height_m: float
+) -> None:
+    assert seen_by_depth(tool_m, held)["drop"]["height_m"] == pytest.approx(height_m, abs=1e-6)
+
+
+def test_beside_all_surfaces_there_is_no_height() -> None:
+    assert seen_by_depth((1.5, 0.0, 0.2))["drop"] is None
+
+
+def test_the_target_is_the_box_around_its_surfaces() -> None:
+    target = seen_by_depth((0.5, 0.0, 0.2))["target"]
+    assert target["name"] == "target"
+    # The target's centre, 100 mm ahead and 110 mm below a tool that advances along the world's x axis.
+    assert target["way_m"] == pytest.approx([0.0, -0.11, 0.1], abs=1e-6)
+    overview = target["boxes"][0]
+    assert overview == pytest.approx([-0.03 / 1.9, 0.05 / 1.9, 0.03 / 1.9, 0.15 / 1.9], abs=1e-3)

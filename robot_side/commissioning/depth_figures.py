@@ -1,0 +1,131 @@
+"""Figures of the pictures of depth cameras, which are looked at and not mapped."""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from common.arrays import FloatArray
+from robot_side.depth.perception import DepthPerception
+from robot_side.depth.picture import CameraPose, DepthErrors, DepthPicture, OwnBody, Pinhole
+from robot_side.depth.settings import MapSettings
+from robot_side.depth.slots import SlotChanges
+from robot_side.depth.support import supported
+from robot_side.depth.view import view_of
+from robot_side.drivers.mujoco.model_enums import GeomKind
+
+NEAR_M: Final = 0.03
+"""Distance from the robot's solids within which a measured point counts as one on them"""
+_POINTS: Final = 4000
+"""Points of a picture that are held against the solids"""
+_NO_MAP: Final = MapSettings(lower_m=(0.0, 0.0, 0.0), upper_m=(0.1, 0.1, 0.1), slots=64)
+
+
+@dataclass(frozen=True, eq=False)
+class PictureFigures:
+    """What one picture was like."""
+
+    age_s: float
+    """Age at which it was looked at, at most"""
+    width: int
+    height: int
+    pinhole: Pinhole
+    errors: DepthErrors
+    """What is allowed for"""
+    holes: float
+    """Share of the pixels in which nothing was measured"""
+    out_of_range: float
+    """Share of the pixels whose depth the camera is not taken to measure"""
+    without_support: float
+    """Share of the pixels with which too few neighbours agree"""
+    depths_m: FloatArray
+    """(3,) depths: of the nearest hundredth, half, and all but a hundredth of the measured pixels; NaN without any"""
+    beyond_m: FloatArray
+    """(k,) signed distances of points from the robot's own surface, up to `NEAR_M`"""
+
+
+class LookedAt(DepthPerception):
+    """Stands where a map would, and keeps the figures of each camera's pictures."""
+
+    def __init__(self) -> None:
+        super().__init__(_NO_MAP)
+        self.now_s = 0.0
+        """Time at which pictures are looked at"""
+        self.figures: dict[int, list[PictureFigures]] = {}
+        """Figures by the camera's number"""
+
+    def see(self, picture: DepthPicture, pose: CameraPose, body: OwnBody, errors: DepthErrors, camera: int) -> None:
+        """Keep the picture's figures."""
+        found = figures_of(picture, pose, body, errors, self.now_s)
+        self.figures.setdefault(camera, []).append(found)
+
+    def changes(self, near_m: FloatArray) -> SlotChanges:
+        """Return that nothing is mapped."""
+        del near_m
+        return self.whole()
+
+
+def figures_of(
+    picture: DepthPicture, pose: CameraPose, body: OwnBody, errors: DepthErrors, now_s: float
+) -> PictureFigures:
+    """Return the figures of a picture; arguments as for `DepthPerception.see`."""
+    depth_m = np.ascontiguousarray(picture.depth_m)
+    kept = supported(depth_m, view_of(picture.pinhole, pose, errors))
+    measured = depth_m > 0.0
+    valid = (depth_m >= errors.least_m) & (depth_m <= errors.most_m)
+    depths_m: FloatArray = (
+        np.quantile(depth_m[measured].astype(float), (0.01, 0.5, 0.99)) if measured.any() else np.full(3, np.nan)
+    )
+    beyond_m = beyond_solids(_points(kept, picture.pinhole, pose), body)
+    return PictureFigures(
+        age_s=now_s - picture.taken_s,
+        width=depth_m.shape[1],
+        height=depth_m.shape[0],
+        pinhole=picture.pinhole,
+        errors=errors,
+        holes=1.0 - float(measured.mean()),
+        out_of_range=float((measured & ~valid).mean()),
+        without_support=float((valid & (kept == 0.0)).mean()),
+        depths_m=depths_m,
+        beyond_m=beyond_m[np.abs(beyond_m) <= NEAR_M],
+    )
+
+
+def _points(depth_m: np.ndarray, pinhole: Pinhole, pose: CameraPose) -> FloatArray:
+    """Return measured points (n, 3) in the world frame, evenly drawn from the picture."""
+    rows, columns = np.nonzero(depth_m)
+    every = max(1, len(rows) // _POINTS)
+    rows, columns = rows[::every], columns[::every]
+    z = depth_m[rows, columns].astype(np.float64)
+    x, y = (columns + 0.5 - pinhole.cx) / pinhole.fx * z, (rows + 0.5 - pinhole.cy) / pinhole.fy * z
+    points_m: FloatArray = pose.position_m + np.stack([x, y, z], axis=1) @ pose.rotation.T
+    return points_m
+
+
+def beyond_solids(points_m: FloatArray, body: OwnBody) -> FloatArray:
+    """Return the signed distances (n,) of points (n, 3) from the surface of the union of the solids; inside below 0.
+
+    For ellipsoids, and inside several solids at once, the amount is at most the true one.
+    """
+    least_m = np.full(len(points_m), np.inf)
+    for kind, place_m, rotation, size in zip(body.kinds, body.positions_m, body.rotations, body.sizes_m, strict=True):
+        local = np.abs((points_m - place_m) @ rotation)
+        across = np.hypot(local[:, 0], local[:, 1])
+        match kind:
+            case GeomKind.BOX:
+                one_m = _beyond_box(local - size)
+            case GeomKind.CYLINDER:
+                one_m = _beyond_box(np.stack([across - size[0], local[:, 2] - size[1]], axis=1))
+            case GeomKind.CAPSULE:
+                one_m = np.hypot(across, np.maximum(local[:, 2] - size[1], 0.0)) - size[0]
+            case GeomKind.ELLIPSOID:
+                one_m = (np.linalg.norm(local / size, axis=1) - 1.0) * size.min()
+            case _:
+                one_m = np.linalg.norm(local, axis=1) - size[0]
+        np.minimum(least_m, one_m, out=least_m)
+    return least_m
+
+
+def _beyond_box(over_m: FloatArray) -> FloatArray:
+    beyond_m: FloatArray = np.linalg.norm(np.maximum(over_m, 0.0), axis=1) + np.minimum(over_m.max(axis=1), 0.0)
+    return beyond_m

@@ -1,0 +1,125 @@
+"""Surfaces that depth cameras see, as viewers get them."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from common.protocol.codec import decode_view, encode
+from common.protocol.view_messages import SceneShapes, SceneState
+from common.roles import ROLES, Role
+from robot_side.arm.bounds import KeepOut
+from robot_side.core.robot_side import RobotSide
+from robot_side.depth.boxes import Boxes
+from robot_side.depth.slots import Slots
+from robot_side.parts import build_parts
+from robot_side.settings import RobotSettings
+from robot_side.surroundings.fixed_objects import joined
+from robot_side.surroundings.perceived import PerceivedObjects
+from robot_side.viewing.scene_view import SURFACES_BYTES_PER_S, SceneView
+from robot_side.viewing.surfaces import SurfaceModel, seen_surfaces
+from tests.robot_side.viewing.test_shapes import finished, shapes_of
+
+SLOTS = 64
+TURNED = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+ROLES_GIVEN = np.array([-1, ROLES.index(Role.TARGET), ROLES.index(Role.SUPPORT)])
+ROW_BYTES = 41
+
+
+def seen(count: int = 3) -> PerceivedObjects:
+    """Return a frame of surfaces in a row, 0.1 m apart."""
+    mapped, shown = Slots(SLOTS), Slots(SLOTS)
+    centers_m = np.stack([0.1 * np.arange(count), np.full(count, 0.2), np.full(count, 0.3)], axis=1)
+    boxes = Boxes(
+        ids=np.arange(count),
+        centers_m=centers_m,
+        rotations=np.tile(TURNED, (count, 1, 1)),
+        half_sizes_m=np.tile([0.04, 0.03, 0.002], (count, 1)),
+        roles=np.resize(ROLES_GIVEN, count),
+        sds_m=np.full(count, 0.001),
+    )
+    shown.apply(mapped.update(boxes, np.zeros(3)))
+    return shown.frame(0.0, np.full(SLOTS, 0.003))
+
+
+def rows_of(state: SceneState) -> "np.ndarray[tuple[int, int], np.dtype[np.float32]]":
+    assert state.surfaces is not None
+    return np.frombuffer(state.surfaces, "<f4").reshape(-1, 10)
+
+
+class Viewer:
+    """Robot side whose view shows surfaces before a box to keep out of."""
+
+    def __init__(self) -> None:
+        keep_out = KeepOut((0.5, 0.5, 0.5), (0.1, 0.1, 0.1))
+        self.parts = build_parts(RobotSettings(arm_keep_out=(keep_out,)), 1, "clock")
+        self.robot = RobotSide(self.parts)
+        self.robot.tick(0.0)
+        model = SurfaceModel(self.parts.scene, self.parts.fixed, SLOTS)
+        parts = self.parts
+        self.view = SceneView(model, parts.kinematics, parts.explains, parts.enlarged, parts.surroundings)
+        self.show(seen())
+
+    def show(self, frame: PerceivedObjects) -> None:
+        assert self.robot.newest is not None
+        sensed, situation = self.robot.newest
+        self.robot.newest = sensed, replace(situation, objects=joined(frame, self.parts.fixed))
+
+    def state(self, taken_s: float = 0.0, surfaces_bytes_per_s: float = SURFACES_BYTES_PER_S) -> SceneState:
+        assert self.robot.newest is not None
+        sensed, situation = self.robot.newest
+        self.view.begin_state(sensed, situation, taken_s, surfaces_bytes_per_s)
+        message = decode_view(encode(finished(self.view)))
+        assert isinstance(message, SceneState)
+        return message
+
+    def shapes(self) -> SceneShapes:
+        return shapes_of(self.robot, self.view)
+
+
+@pytest.fixture(scope="module")
+def viewer() -> Viewer:
+    return Viewer()
+
+
+def test_used_surfaces_are_shown_with_their_roles_and_no_parked_one() -> None:
+    surfaces, roles = seen_surfaces(seen(), SLOTS)
+    rows = np.frombuffer(surfaces, "<f4").reshape(-1, 10)
+    assert rows[:, :3] == pytest.approx(np.array([[0.0, 0.2, 0.3], [0.1, 0.2, 0.3], [0.2, 0.2, 0.3]]))
+    assert rows[:, 3:7] == pytest.approx(np.tile([np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5)], (3, 1)))
+    assert rows[:, 7:] == pytest.approx(np.tile([0.04, 0.03, 0.002], (3, 1)))
+    assert [ROLES[role] for role in roles] == [Role.OBSTACLE, Role.TARGET, Role.SUPPORT]
+    assert seen_surfaces(seen(0), SLOTS) == (b"", b"")
+
+
+def test_shapes_have_what_is_fixed_and_stay_when_surfaces_come_and_go(viewer: Viewer) -> None:
+    viewer.show(seen())
+    shapes = viewer.shapes()
+    assert shapes.objects == ("keep out 1",)
+    assert [shape.owner for shape in shapes.shapes if not shape.of_robot] == [0]
+    assert np.frombuffer(shapes.object_poses, "<f4")[:3] == pytest.approx([0.5, 0.5, 0.5])
+    viewer.show(seen(40))
+    assert viewer.robot.newest is not None
+    assert not viewer.view.outdated(viewer.robot.newest[1].objects)
+
+
+def test_states_have_surfaces_once_a_second(viewer: Viewer) -> None:
+    viewer.show(seen())
+    states = [viewer.state(100.0 + 0.1 * tick) for tick in range(25)]
+    assert [tick for tick, state in enumerate(states) if state.surfaces is not None] == [0, 10, 20]
+    assert len(rows_of(states[0])) == 3
+    assert all(state.roles == bytes([ROLES.index(Role.OBSTACLE)]) for state in states)
+    assert np.frombuffer(states[1].object_poses, "<f4")[:3] == pytest.approx([0.5, 0.5, 0.5])
+
+
+def test_over_a_slow_link_they_come_less_often(viewer: Viewer) -> None:
+    viewer.show(seen(SLOTS))
+    every_s = 4.0
+    slow = ROW_BYTES * SLOTS / every_s
+    states = [viewer.state(200.0 + tick, slow) for tick in range(9)]
+    assert [tick for tick, state in enumerate(states) if state.surfaces is not None] == [0, 4, 8]
+
+
+def test_that_none_is_left_is_told_too(viewer: Viewer) -> None:
+    viewer.show(seen(0))
+    assert rows_of(viewer.state(300.0)).shape == (0, 10)
