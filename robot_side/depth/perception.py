@@ -1,5 +1,7 @@
 """From pictures to surfaces that are handed on: the map, and a fixed pool of objects that shows it."""
 
+from dataclasses import asdict
+
 from common.arrays import FloatArray
 from common.roles import Role
 from robot_side.depth.depth_map import DepthMap, Integrated
@@ -37,3 +39,7 @@ class DepthPerception:
             self._map.unmark(Role.TARGET)
         elif (box := self._slots.box_of(name)) is not None:
             self._map.mark(box, role)
+
+    def newest(self) -> dict[str, float]:
+        """Return what the newest picture did, by name."""
+        return {} if self.last is None else {name: float(value) for name, value in asdict(self.last).items()}

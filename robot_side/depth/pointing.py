@@ -8,11 +8,12 @@ from scipy.spatial import cKDTree
 from common.arrays import BoolArray, FloatArray, IntArray
 from robot_side.depth.boxes import Boxes
 from robot_side.depth.surfel_map.surfels import SurfelMap
+from robot_side.depth.together import planes_of
 
 _REACH_M: Final = 0.1
 """Distance from the box that was pointed at, within which its patch ends"""
-_LARGE_M: Final = 0.07
-"""Half of the width from which on a box is a support or a wall, and no part of what can be grasped"""
+_LARGE_M2: Final = 0.03
+"""Area from which on a plane is a support or a wall, and no part of what can be grasped"""
 _NEXT_CELLS: Final = 1.8
 """Distance of neighbours, in cells"""
 
@@ -27,7 +28,9 @@ def patch_around(boxes: Boxes, box: int, surfels: SurfelMap, cell_m: float) -> I
     near = np.linalg.norm(points_m - boxes.centers_m[box], axis=1) <= _REACH_M + float(boxes.half_sizes_m[box].max())
     rows, points_m = rows[near], points_m[near]
     seeds = _within(boxes, box, points_m, cell_m)
-    large = np.flatnonzero(boxes.half_sizes_m[:, :2].min(axis=1) >= _LARGE_M)
+    planes = planes_of(boxes)
+    areas_m2 = np.bincount(planes, 4.0 * boxes.half_sizes_m[:, :2].prod(axis=1))
+    large = np.flatnonzero(areas_m2[planes] >= _LARGE_M2)
     for other in large[large != box].tolist():
         small = ~_within(boxes, other, points_m, cell_m)
         points_m, rows, seeds = points_m[small], rows[small], seeds[small]

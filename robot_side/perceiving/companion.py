@@ -7,11 +7,8 @@ import select
 import sys
 from collections.abc import Callable
 from contextlib import ExitStack
-from dataclasses import asdict
 from pathlib import Path
 from typing import Final
-
-import numpy as np
 
 from common.clock import MonotonicClock
 from common.companion.channel import Channel
@@ -36,11 +33,11 @@ from robot_side.perceiving.exchange import (
     Refusal,
     RoleOf,
     Setup,
-    Surfaces,
     decode_to_companion,
     encode,
+    surfaces,
 )
-from robot_side.perceiving.taking import News, SentPictures, SimulatedPictures, Taking
+from robot_side.perceiving.taking import SentPictures, SimulatedPictures, Taking
 
 _NICENESS: Final = -5
 """Above ordinary programs, as what is felt waits for it; below the sides"""
@@ -127,23 +124,8 @@ def _serve(channel: Channel, taking: Taking, wait: Callable[[float], object], wa
         if news is not None:
             # What has not been sent is lost, and all is sent instead.
             changes = news.changes if all_sent else taking.perception.whole()
-            all_sent = channel.send(encode(_surfaces(news._replace(changes=changes), taking.perception)))
+            all_sent = channel.send(encode(surfaces(changes, news.taken_s, taking.perception.newest())))
         wait(_WAIT_S)
-
-
-def _surfaces(news: News, perception: DepthPerception) -> Surfaces:
-    changes, last = news.changes, perception.last
-    seen = {} if last is None else {name: float(value) for name, value in asdict(last).items()}
-    return Surfaces(
-        taken_s=news.taken_s,
-        slots=changes.slots.astype(np.int64).tobytes(),
-        numbers=changes.numbers.tobytes(),
-        roles=changes.roles.astype(np.int64).tobytes(),
-        sds_m=changes.sds_m.tobytes(),
-        planes=changes.planes.tobytes(),
-        crowded_out=changes.crowded_out,
-        seen=seen,
-    )
 
 
 if __name__ == "__main__":

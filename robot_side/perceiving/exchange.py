@@ -7,11 +7,13 @@ robot side ◀── Ready, Surfaces, Note, Refusal ── companion
 from typing import Final
 
 import msgspec
+import numpy as np
 
 from common.roles import Role
 from common.sockets.door.messages import DoorSettings
 from robot_side.depth.camera_settings import DepthCameraSettings, LinkMount
 from robot_side.depth.settings import MapSettings
+from robot_side.depth.slots import BOX_NUMBERS, SlotChanges
 
 
 class Loaded(msgspec.Struct, frozen=True):
@@ -81,6 +83,32 @@ class Surfaces(msgspec.Struct, frozen=True, tag=True):
     crowded_out: int
     seen: dict[str, float]
     """Figures of the pictures since the last message, and of the map"""
+
+
+def surfaces(changes: SlotChanges, taken_s: tuple[float, float], seen: dict[str, float]) -> Surfaces:
+    """Return the message of these changes; arguments as the message's fields."""
+    return Surfaces(
+        taken_s=taken_s,
+        slots=changes.slots.tobytes(),
+        numbers=changes.numbers.tobytes(),
+        roles=changes.roles.tobytes(),
+        sds_m=changes.sds_m.tobytes(),
+        planes=changes.planes.tobytes(),
+        crowded_out=changes.crowded_out,
+        seen=seen,
+    )
+
+
+def changes_of(message: Surfaces) -> SlotChanges:
+    """Return the changes of a message."""
+    return SlotChanges(
+        np.frombuffer(message.slots, dtype=np.int64),
+        np.frombuffer(message.numbers).reshape(-1, BOX_NUMBERS),
+        np.frombuffer(message.roles, dtype=np.int64),
+        np.frombuffer(message.sds_m),
+        np.frombuffer(message.planes, dtype=np.int64),
+        message.crowded_out,
+    )
 
 
 class Note(msgspec.Struct, frozen=True, tag=True):

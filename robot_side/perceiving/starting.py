@@ -17,12 +17,8 @@ _BYTES_PER_S: Final = 64e6
 """Budget of each camera: 848 x 480 pixels with labels at 30 Hz, and some more"""
 
 
-@contextmanager
-def surfaced(settings: RobotSettings, note: Callable[[str], None]) -> Iterator[Surfaced | None]:
-    """Yield the source of what depth cameras see; None if the settings want none. note: as for Surfaced."""
-    if not settings.by_depth:
-        yield None
-        return
+def setup_of(settings: RobotSettings) -> Setup:
+    """Return what the process that maps pictures needs to know."""
     model = None if settings.model is None else str(settings.model.absolute())
     name = settings.scene or "table"
     scene = Loaded(model, settings.site, dict(settings.roles), name, settings.seed, settings.site_axis)
@@ -32,9 +28,16 @@ def surfaced(settings: RobotSettings, note: Callable[[str], None]) -> Iterator[S
         driver = DriverSettings(settings.depth, "perception", DEPTH_LIMIT_BYTES, _BYTES_PER_S)
         keys = None if settings.keys is None else str(settings.keys)
         port = DoorSettings(settings.bind, None, {DEPTH_PORT: driver}, insecure=settings.insecure, keys=keys)
-    setup = Setup(scene, settings.depth_camera, settings.depth_map, settings.depth_mounts, encoder, port, settings.seed)
+    return Setup(scene, settings.depth_camera, settings.depth_map, settings.depth_mounts, encoder, port, settings.seed)
 
-    source = Surfaced(setup, partial(surface_frames, settings), note)
+
+@contextmanager
+def surfaced(settings: RobotSettings, note: Callable[[str], None]) -> Iterator[Surfaced | None]:
+    """Yield the source of what depth cameras see; None if the settings want none. note: as for Surfaced."""
+    if not settings.by_depth:
+        yield None
+        return
+    source = Surfaced(setup_of(settings), partial(surface_frames, settings), note)
     try:
         yield source
     finally:

@@ -15,7 +15,6 @@ from common.errors import ConfigurationError, FeelaheadError
 from common.roles import Role
 from robot_side.arm.port import Arm, ArmState
 from robot_side.depth.frames import SurfaceFrames
-from robot_side.depth.slots import BOX_NUMBERS, SlotChanges
 from robot_side.drivers.mujoco.scene import Scene
 from robot_side.perceiving.exchange import (
     Joints,
@@ -25,6 +24,7 @@ from robot_side.perceiving.exchange import (
     RoleOf,
     Setup,
     Surfaces,
+    changes_of,
     decode_from_companion,
     encode,
 )
@@ -152,15 +152,7 @@ class Surfaced(Listener):
             self._show(message, now_s)
 
     def _show(self, message: Surfaces, now_s: float) -> None:
-        slots = np.frombuffer(message.slots, dtype=np.int64)
-        changes = SlotChanges(
-            slots,
-            np.frombuffer(message.numbers).reshape(-1, BOX_NUMBERS),
-            np.frombuffer(message.roles, dtype=np.int64),
-            np.frombuffer(message.sds_m),
-            np.frombuffer(message.planes, dtype=np.int64),
-            message.crowded_out,
-        )
+        changes = changes_of(message)
         if self._is_new:
             self._growing, self._is_new = (self._new_frames(), now_s), False
         shown = self._growing[0] if self._growing is not None else self._frames
@@ -170,7 +162,7 @@ class Surfaced(Listener):
         self._newest = message.seen | {"crowded_out": float(message.crowded_out)}
         self._ages_s = [*self._ages_s[-999:], now_s - message.taken_s[0]]
         self._figures["frames"] += 1
-        self._figures["changed"] += len(slots)
+        self._figures["changed"] += len(changes.slots)
 
     def close(self) -> None:
         """End the companion."""
