@@ -139,7 +139,7 @@ def _cameras(
 def _shown(settings: RobotSettings, parts: SceneParts) -> SceneModel:
     """Return what viewers see of the scene, by the kind of its objects."""
     if settings.by_depth:
-        return SurfaceModel(parts.scene, parts.fixed, settings.depth_map.slots)
+        return SurfaceModel(parts.scene, parts.fixed, 1 + settings.depth_map.slots)
     return PerceivedModel(parts.scene) if parts.any_objects else SceneModel(parts.scene, parts.fixed)
 
 

@@ -1,7 +1,7 @@
 """Making of the parts of a robot side from its settings. Arm and objects are simulated or come from drivers."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -17,7 +17,6 @@ from robot_side.arm.limits import JointLimits
 from robot_side.compiled.kernel import Compiled, imported_kernels
 from robot_side.core.robot_parts import RobotParts
 from robot_side.drivers.mujoco.arm import MujocoArm, stand
-from robot_side.drivers.mujoco.camera import MujocoCamera
 from robot_side.drivers.mujoco.checks.cost import cost_findings
 from robot_side.drivers.mujoco.checks.following import following_findings
 from robot_side.drivers.mujoco.checks.joints import joint_findings
@@ -50,7 +49,7 @@ from robot_side.operators.tuning import Tuning
 from robot_side.perceiving.object_source import simulated_camera, source_of
 from robot_side.settings import RobotSettings
 from robot_side.surroundings.fixed_objects import fixed_objects, with_fixed
-from robot_side.surroundings.perceived import KINDS, ObjectSource, PerceivedObjects
+from robot_side.surroundings.perceived import KINDS, ObjectSource, PerceivedObjects, PutBack
 from robot_side.surroundings.surroundings import Surroundings
 
 if TYPE_CHECKING:
@@ -127,6 +126,7 @@ def build_parts(
     unseen_m_s = settings.camera.unseen_m_s
     seen_elsewhere = None if drivers is None else drivers.objects(settings.roles, unseen_m_s, surroundings.see)
     fixed = fixed_objects(settings.workspace_m, settings.arm_keep_out)
+    source = seen_elsewhere or surfaces or source_of(settings, scene, camera, int(camera_noise))
     # Before the first tick, as a search for spheres takes far longer than one.
     first = perceived([], [], 0.0) if settings.sees_any else as_loaded(scene, scene.roles)
     held_covers = HeldCovers(first, settings.cover_m, scene.never_held, searching)
@@ -148,7 +148,8 @@ def build_parts(
     return SceneParts(
         arm=arm,
         kinematics=kinematics,
-        camera=with_fixed(seen_elsewhere or surfaces or source_of(settings, scene, camera, int(camera_noise)), fixed),
+        # Depth cameras' frames have the fixed objects already.
+        camera=source if settings.by_depth else with_fixed(source, fixed),
         fixed=fixed,
         law=law,
         explains=law,
@@ -159,7 +160,7 @@ def build_parts(
             Safety(settings.safety),
             settings.seed,
             Tuning(settings.probability, expect if settings.permit_tuning else None),
-            _episodes(settings, arm, camera),
+            _episodes(settings, arm, [camera, source]),
         ),
         loop_age=LoopAge(settings.assumed_delay_s),
         limits=limits,
@@ -197,15 +198,17 @@ def take_limits(settings: RobotSettings, parts: SceneParts, drivers: ConnectedDr
     return replace(settings, arm_limits=limits), f"the arm's limits: {given.sources(said)}"
 
 
-def _episodes(settings: RobotSettings, arm: MujocoArm | RemoteArm, camera: MujocoCamera) -> Episodes:
+def _episodes(settings: RobotSettings, arm: MujocoArm | RemoteArm, sources: Sequence[ObjectSource]) -> Episodes:
     """Return the judge of marks: a driver's arm does not go home by itself, nor do objects that are seen elsewhere."""
-    driven = [f"--{what}" for what in ("arm", "objects") if getattr(settings, what) is not None]
+    driven = [f"--{what}" for what in ("arm", "objects", "depth") if getattr(settings, what) is not None]
     if driven or not isinstance(arm, MujocoArm):
         return Episodes(refuses=f"{' and '.join(driven)}: a driver's things stay; valid: all simulated")
 
     def put_back() -> None:
         arm.put_back()
-        camera.put_back()
+        for source in sources:
+            if isinstance(source, PutBack):
+                source.put_back()
 
     return Episodes(put_back)
 

@@ -59,9 +59,9 @@ class LookedAt(DepthPerception):
         found = figures_of(picture, pose, body, errors, self.now_s)
         self.figures.setdefault(camera, []).append(found)
 
-    def changes(self, near_m: FloatArray) -> SlotChanges:
+    def changes(self, near_m: FloatArray, *, holds: bool = False) -> SlotChanges:
         """Return that nothing is mapped."""
-        del near_m
+        del near_m, holds
         return self.whole()
 
 

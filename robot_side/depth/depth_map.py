@@ -102,5 +102,7 @@ class DepthMap:
         self._give(rows[self.surfels.table.roles[rows] == ROLES.index(role)], Role.OBSTACLE)
 
     def _give(self, rows: IntArray, role: Role) -> None:
-        self.surfels.table.roles[rows] = NO_ROLE if role is Role.OBSTACLE else ROLES.index(role)
+        table = self.surfels.table
+        table.roles[rows] = NO_ROLE if role is Role.OBSTACLE else ROLES.index(role)
+        table.pointed[rows] = 1
         self.surfels.look_again(rows)

@@ -1,7 +1,6 @@
 """Frames of the surfaces that were handed on, with their errors and their age."""
 
 import math
-from typing import Final
 
 import numpy as np
 
@@ -10,18 +9,18 @@ from robot_side.depth.slots import SlotChanges, Slots
 from robot_side.surroundings.age import since
 from robot_side.surroundings.perceived import PerceivedObjects
 
-_LEVELS: Final = (1.0, 1.5, 2.5)
-"""Levels of σ_c, as factors of that of calibration and mount: the surfaces of each level take a look of their own"""
-_SLACK: Final = 1.08
-"""Factor up to which a greater error belongs to a level"""
-
 
 class SurfaceFrames:
     """Newest surfaces, as the law gets them."""
 
-    def __init__(self, slots: int, camera_sd_m: float, unseen_m_s: float) -> None:
-        """slots: number of surfaces. camera_sd_m: σ_c of calibration and mount. unseen_m_s: as for RemoteObjects."""
-        self._slots, self._camera_sd_m, self._unseen_m_s = Slots(slots), camera_sd_m, unseen_m_s
+    def __init__(
+        self, slots: int, camera_sd_m: float, unseen_m_s: float, fixed: PerceivedObjects | None = None
+    ) -> None:
+        """slots: number of surfaces. camera_sd_m: σ_c of calibration and mount. unseen_m_s: as for RemoteObjects.
+
+        fixed: as for Slots.
+        """
+        self._slots, self._camera_sd_m, self._unseen_m_s = Slots(slots, fixed), camera_sd_m, unseen_m_s
         self._taken_s = (math.inf, math.inf)
         self._frame = self._slots.first
         self._unseen_m = 0.0
@@ -41,8 +40,5 @@ class SurfaceFrames:
 
     def _sds_m(self) -> FloatArray:
         """Return σ_c of each slot (k,): of calibration and mount, and of the pixels that made the surface (eq. 1-2)."""
-        levels_m = self._camera_sd_m * np.array(_LEVELS)
-        whole_m = np.hypot(self._camera_sd_m, self._slots.sds_m)
-        level = np.searchsorted(_SLACK * levels_m, whole_m).clip(max=len(_LEVELS) - 1)
-        sds_m: FloatArray = levels_m[level]
+        sds_m: FloatArray = np.hypot(self._camera_sd_m, self._slots.sds_m)
         return sds_m

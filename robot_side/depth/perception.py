@@ -25,9 +25,12 @@ class DepthPerception:
         self._errors = errors
         self.last = self._map.integrate(picture, pose, body, errors, camera)
 
-    def changes(self, near_m: FloatArray) -> SlotChanges:
-        """Return what has changed since the last call, the surfaces nearest to `near_m` (3,) first."""
-        return self._slots.update(self._map.boxes(), near_m, self._errors)
+    def changes(self, near_m: FloatArray, *, holds: bool = False) -> SlotChanges:
+        """Return what has changed since the last call, the surfaces nearest to `near_m` (3,) first.
+
+        holds: whether the gripper holds something.
+        """
+        return self._slots.update(self._map.boxes(), near_m, self._errors, holds=holds)
 
     def whole(self) -> SlotChanges:
         """Return all surfaces as changes, for a process that has missed some."""

@@ -16,6 +16,7 @@ from robot_side.depth.boxes import Boxes
 from robot_side.depth.picture import DepthErrors
 from robot_side.depth.surface_errors import surface_sds
 from robot_side.depth.together import largest_piece, planes_of
+from robot_side.surroundings.fixed_objects import joined
 from robot_side.surroundings.kinds.layout import NUMBERS
 from robot_side.surroundings.movers import Movers
 from robot_side.surroundings.perceived import PerceivedObjects
@@ -55,13 +56,14 @@ class SlotChanges:
 class Slots:
     """Pool of slots."""
 
-    def __init__(self, count: int) -> None:
-        """count: number of slots that are objects of their own."""
+    def __init__(self, count: int, fixed: PerceivedObjects | None = None) -> None:
+        """count: number of slots that are objects of their own. fixed: objects behind these that are always there."""
         none, rows = np.empty(0, dtype=np.int64), PIECES + count
         self._numbers, self._roles, self.sds_m = _unused(rows)
         """(n,) standard deviation of each slot's place by its pixels' errors; 0 for unused slots"""
         self._ids: IntArray = np.full(rows, -1)
         self._planes: IntArray = np.full(rows, -1)
+        self._barred: BoolArray = np.zeros(rows, dtype=np.bool_)
         self._frame_roles: tuple[Role, ...] = (Role.OBSTACLE,) * (1 + count)
         self._objects = np.concatenate([np.zeros(PIECES, dtype=np.int64), np.arange(1, 1 + count)])
         """(n,) index of each slot's object"""
@@ -86,6 +88,9 @@ class Slots:
             rotations=placed[:, 3:12].reshape(-1, 3, 3).copy(),
             velocities_m_s=np.zeros((1 + count, 3)),
         )
+        self._fixed_roles = () if fixed is None else fixed.roles
+        if fixed is not None and fixed.names:
+            first = joined(first, fixed)
         self._movers = Movers(first, np.arange(1 + count))
         self._frame_numbers = np.zeros((rows + 1 + count, NUMBERS))
         self._write(np.arange(rows))
@@ -101,10 +106,13 @@ class Slots:
         held = held[held >= 0]
         return int(held[0]) if held.size else None
 
-    def update(self, boxes: Boxes, near_m: FloatArray, errors: DepthErrors = EXACT) -> SlotChanges:
+    def update(
+        self, boxes: Boxes, near_m: FloatArray, errors: DepthErrors = EXACT, *, holds: bool = False
+    ) -> SlotChanges:
         """Give each box a slot, which it keeps as long as it is there, and return what changed.
 
-        errors: of the cameras.
+        errors: of the cameras. holds: whether the gripper holds something. Slots that become free meanwhile stay free:
+        one may be that of the held object, and nobody would feel another box in it.
 
         near_m (3,): the gripper's place; if there are too many boxes, those nearest to it get slots. A box without a
         role is an obstacle; boxes of the target are its pieces; ignored ones get no slot.
@@ -117,19 +125,23 @@ class Slots:
         of_pixels_m = surface_sds(boxes, of_planes, errors)
         numbers, roles, sds_m = _unused(len(self._ids))
         planes: IntArray = np.full(len(self._ids), -1)
-        crowded_out = 0
-        for rows, those in zip((slice(0, PIECES), slice(PIECES, None)), groups, strict=True):
-            ids = self._ids[rows]
-            chosen = those if len(those) <= len(ids) else np.sort(those[np.argsort(away_m[those])[: len(ids)]])
-            crowded_out += len(those) - len(chosen)
-            _assign(ids, boxes.ids[chosen])
+        left: IntArray = np.empty(0, dtype=np.int64)
+        for rows, of_group in zip((slice(0, PIECES), slice(PIECES, None)), groups, strict=True):
+            ids, barred = self._ids[rows], self._barred[rows]
+            barred &= holds
+            room = len(ids) - np.count_nonzero(barred)
+            those = np.sort(np.concatenate([of_group, left]))
+            chosen = those if len(those) <= room else np.sort(those[np.argsort(away_m[those])[:room]])
+            # Pieces for which there is no room are obstacles.
+            left = np.setdiff1d(those, chosen)
+            _assign(ids, boxes.ids[chosen], barred, holds=holds)
             used = np.flatnonzero(ids >= 0)
             order = np.argsort(boxes.ids[chosen], kind="stable")
             of = chosen[order[np.searchsorted(boxes.ids[chosen][order], ids[used])]]
             rotations = boxes.rotations[of].reshape(len(of), 9)
             numbers[rows][used] = np.concatenate([boxes.centers_m[of], rotations, boxes.half_sizes_m[of]], axis=1)
             given = boxes.roles[of]
-            is_none = (given < 0) | (~is_piece[of] & (given == _TARGET))
+            is_none = (given < 0) | ((rows.start == PIECES) & (given == _TARGET))
             roles[rows][used] = np.where(is_none, roles[rows][used], given)
             sds_m[rows][used] = of_pixels_m[of]
             if rows.stop is None:
@@ -138,7 +150,7 @@ class Slots:
         same = (numbers == self._numbers).all(axis=1) & (roles == self._roles) & (sds_m == self.sds_m)
         changed = np.flatnonzero(~same | (planes != self._planes))
         self._numbers, self._roles, self.sds_m, self._planes = numbers, roles, sds_m, planes
-        return SlotChanges(changed, numbers[changed], roles[changed], sds_m[changed], planes[changed], crowded_out)
+        return SlotChanges(changed, numbers[changed], roles[changed], sds_m[changed], planes[changed], len(left))
 
     def whole(self) -> SlotChanges:
         """Return all slots as changes, for a process that has just started."""
@@ -171,12 +183,12 @@ class Slots:
 
     def frame(self, time_s: float, of_slots_m: FloatArray, unseen_m: float = 0.0) -> PerceivedObjects:
         """Return the frame of all changes so far. of_slots_m (n,): σ_c of each slot. unseen_m: as in a frame."""
-        sds_m = np.concatenate([[of_slots_m[:PIECES].max()], of_slots_m[PIECES:]])
+        fixed = len(self._fixed_roles)
+        sds_m = np.concatenate([[of_slots_m[:PIECES].max()], of_slots_m[PIECES:], np.zeros(fixed)])
         # The target is an object by itself.
-        surfaces = self._planes[PIECES - 1 :].copy()
-        surfaces[0] = -1
+        surfaces = np.concatenate([[-1], self._planes[PIECES:], np.full(fixed, -1)])
         return self._movers.frame(
-            time_s, self._frame_numbers, self._frame_roles, unseen_m, sds_m=sds_m, surfaces=surfaces
+            time_s, self._frame_numbers, self._frame_roles + self._fixed_roles, unseen_m, sds_m=sds_m, surfaces=surfaces
         )
 
     def _write(self, slots: IntArray) -> None:
@@ -186,13 +198,19 @@ class Slots:
         self._frame_numbers[len(self._ids) + self._objects[own], : _SIZES.start] = self._numbers[own, : _SIZES.start]
 
 
-def _assign(held: IntArray, ids: IntArray) -> None:
-    """Let boxes `ids` have slots, in place: each keeps its own, and new ones get the first that are free."""
+def _assign(held: IntArray, ids: IntArray, barred: BoolArray, *, holds: bool) -> None:
+    """Let boxes `ids` have slots, in place: each keeps its own, and new ones get the first that are free.
+
+    barred: slots that nobody gets; with `holds` those that become free are barred, too.
+    """
     slots = np.flatnonzero(held >= 0)
-    held[slots[~np.isin(held[slots], ids)]] = -1
+    gone = slots[~np.isin(held[slots], ids)]
+    held[gone] = -1
+    barred[gone] |= holds
     new = np.flatnonzero(~np.isin(ids, held))
     # Boxes of neighbouring numbers are neighbours, and a scene's blocks are of neighbouring slots.
-    held[np.flatnonzero(held < 0)[: len(new)]] = ids[new]
+    free = np.flatnonzero((held < 0) & ~barred)[: len(new)]
+    held[free] = ids[new[: len(free)]]
 
 
 def _by_first(planes: IntArray, objects: IntArray) -> IntArray:

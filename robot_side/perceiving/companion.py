@@ -27,6 +27,7 @@ from robot_side.drivers.mujoco.encoders import Encoder
 from robot_side.drivers.mujoco.scene import Scene, load_scene
 from robot_side.drivers.remote.depth import RemoteDepth
 from robot_side.perceiving.exchange import (
+    Forget,
     Joints,
     Note,
     Ready,
@@ -119,6 +120,9 @@ def _serve(channel: Channel, taking: Taking, wait: Callable[[float], object], wa
                 taking.hear(message)
             elif isinstance(message, RoleOf):
                 taking.set_role(message.name, message.role)
+            elif isinstance(message, Forget):
+                taking.forget()
+                all_sent = False
         waiting = []
         news = taking.step(clock.now())
         if news is not None:

@@ -1,6 +1,6 @@
 """Messages between the robot side and the process that maps depth pictures.
 
-robot side ── Setup, Joints, RoleOf ──▶ companion
+robot side ── Setup, Joints, RoleOf, Forget ──▶ companion
 robot side ◀── Ready, Surfaces, Note, Refusal ── companion
 """
 
@@ -61,6 +61,10 @@ class RoleOf(msgspec.Struct, frozen=True, tag=True):
 
     name: str
     role: Role
+
+
+class Forget(msgspec.Struct, frozen=True, tag=True):
+    """What was seen is to be forgotten, as the objects were put back."""
 
 
 class Ready(msgspec.Struct, frozen=True, tag=True):
@@ -124,5 +128,5 @@ class Refusal(msgspec.Struct, frozen=True, tag=True):
 
 
 encode: Final = msgspec.msgpack.Encoder().encode
-decode_to_companion: Final = msgspec.msgpack.Decoder(Setup | Joints | RoleOf).decode
+decode_to_companion: Final = msgspec.msgpack.Decoder(Setup | Joints | RoleOf | Forget).decode
 decode_from_companion: Final = msgspec.msgpack.Decoder(Ready | Surfaces | Note | Refusal).decode

@@ -1,5 +1,6 @@
 """Sources of objects in this process, by the settings."""
 
+import math
 from functools import partial
 
 from robot_side.depth.camera_settings import BY_DEPTH
@@ -9,12 +10,15 @@ from robot_side.drivers.mujoco.encoders import Encoder
 from robot_side.drivers.mujoco.scene import Scene
 from robot_side.perceiving.own_perception import perceived_by
 from robot_side.settings import RobotSettings
+from robot_side.surroundings.fixed_objects import fixed_objects
 from robot_side.surroundings.perceived import ObjectSource
 
 
 def surface_frames(settings: RobotSettings) -> SurfaceFrames:
     """Return empty frames of the surfaces that depth cameras see."""
-    return SurfaceFrames(settings.depth_map.slots, settings.camera.sd_m, settings.camera.unseen_m_s)
+    camera, fixed = settings.camera, fixed_objects(settings.workspace_m, settings.arm_keep_out)
+    sd_m = math.hypot(camera.sd_m, camera.frame_sd_m)
+    return SurfaceFrames(settings.depth_map.slots, sd_m, camera.unseen_m_s, fixed)
 
 
 def source_of(settings: RobotSettings, scene: Scene, camera: MujocoCamera, seed: int) -> ObjectSource:

@@ -17,6 +17,7 @@ from robot_side.arm.port import Arm, ArmState
 from robot_side.depth.frames import SurfaceFrames
 from robot_side.drivers.mujoco.scene import Scene
 from robot_side.perceiving.exchange import (
+    Forget,
     Joints,
     Note,
     Ready,
@@ -36,9 +37,14 @@ OLD_S: Final = 0.5
 """Age of the newest picture, in seconds, above which a note is made. Surfaces stay, so triggers stay stiff."""
 _TURN_S: Final = 0.01
 _JOINTS_PERIOD_S: Final = 0.008
-_NEW_MAP_S: Final = 0.5
-"""Time for which a new map grows before it replaces the one before"""
+_FIRST_MAP_S: Final = 0.5
+_NEW_MAP_S: Final = 2.0
+"""Times for which the first map grows, and one that replaces another"""
+_NEW_MAP_PICTURES: Final = 4
+"""Least number of pictures of a map that is shown: a surface is there from its second on"""
 _RETRY_S: Final = 2.0
+_HANGS_S: Final = 5.0
+"""Time without a picture, in seconds, after which a companion that does not compute is taken to hang"""
 _SILENT_S: Final = 60.0
 """Time to the first answer of a companion, in seconds, from which on it is taken to hang: it may compile"""
 
@@ -64,7 +70,8 @@ class Surfaced(Listener):
         self._growing: tuple[SurfaceFrames, float] | None = None
         """Frames of a new map, and the time of its first surfaces"""
         self._begins_s, self._taken_s, self._told_s = -math.inf, -math.inf, -math.inf
-        self._is_old, self._is_new = False, False
+        self._is_old, self._is_new, self._is_ready = False, False, False
+        self._looked_s, self._pictures, self._said_crowded = -math.inf, 0, False
         self._figures: Counter[str] = Counter()
         self._newest: dict[str, float] = {}
         self._ages_s: list[float] = []
@@ -79,8 +86,14 @@ class Surfaced(Listener):
 
     def set_role(self, name: str, role: Role) -> None:
         """Change the role of the object `name`, from a later frame on."""
-        if self._companion is not None:
+        # Until a new map is shown, its names are others than those that people see.
+        if self._companion is not None and self._growing is None and not self._is_new:
             self._companion.channel.send(encode(RoleOf(name, role)))
+
+    def put_back(self) -> None:
+        """Forget what was seen, as the objects were put back."""
+        if self._companion is not None:
+            self._companion.channel.send(encode(Forget()))
 
     def on_tick(self, tick: Tick) -> None:
         """Tell where the robot is."""
@@ -117,15 +130,21 @@ class Surfaced(Listener):
         companion = self._companion
         if companion is None:
             if now_s >= self._begins_s:
-                self._begins_s, self._is_new = now_s, True
+                self._begins_s, self._is_new, self._is_ready, self._pictures = now_s, True, False, 0
                 self._companion = self._start()
                 self._companion.channel.send(self._setup)
             return
         for payload in companion.channel.receive():
             self._take(payload, now_s)
-        if self._growing is not None and now_s - self._growing[1] >= _NEW_MAP_S:
+        grows_s = _FIRST_MAP_S if self._frames is None else _NEW_MAP_S
+        if self._growing is not None and now_s - self._growing[1] >= grows_s and self._pictures >= _NEW_MAP_PICTURES:
+            if self._frames is not None:
+                self._note("depth: there is a new map; what no camera sees now is forgotten")
             self._frames, self._growing = self._growing[0], None
-        silent = self._is_new and now_s - self._begins_s > _SILENT_S
+        silent = not self._is_ready and now_s - self._begins_s > _SILENT_S
+        if now_s - max(self._taken_s, self._looked_s) > _HANGS_S:
+            self._looked_s = now_s
+            silent |= self._is_ready and not companion.works()
         if companion.channel.ended or silent:
             self._note(f"depth: the process that maps pictures has ended; it is started again in {_RETRY_S:g} s")
             companion.close(0.0)
@@ -145,7 +164,7 @@ class Surfaced(Listener):
         elif isinstance(message, Note):
             self._note(message.text)
         elif isinstance(message, Ready):
-            self.endpoint = message.endpoint
+            self.endpoint, self._is_ready = message.endpoint, True
             if message.endpoint:
                 self._note(f"depth pictures are taken at {message.endpoint}")
         else:
@@ -158,7 +177,13 @@ class Surfaced(Listener):
         shown = self._growing[0] if self._growing is not None else self._frames
         if shown is not None:
             shown.take(changes, message.taken_s)
-        self._taken_s = message.taken_s[0]
+        self._taken_s, self._pictures = message.taken_s[0], self._pictures + 1
+        if not self._said_crowded and (message.crowded_out or message.seen.get("without_room")):
+            self._said_crowded = True
+            text = (
+                "surfaces far from the gripper are left out; more: --depth-map.slots, or a greater --depth-map.cell-m"
+            )
+            self._note(f"depth: there are too many surfaces: {text}")
         self._newest = message.seen | {"crowded_out": float(message.crowded_out)}
         self._ages_s = [*self._ages_s[-999:], now_s - message.taken_s[0]]
         self._figures["frames"] += 1

@@ -49,6 +49,10 @@ class Taking(Protocol):
         """Change the role of an object, by its name at the robot side."""
         ...
 
+    def forget(self) -> None:
+        """Forget what was seen, as the objects were put back."""
+        ...
+
     def step(self, now_s: float) -> News | None:
         """Take the pictures that are due or have arrived; None without any."""
         ...
@@ -77,6 +81,10 @@ class SimulatedPictures:
         """Change the role of a surface."""
         self._rig.perception.set_role(name, role)
 
+    def forget(self) -> None:
+        """Forget what was seen."""
+        self._rig.restart()
+
     def step(self, now_s: float) -> News | None:
         """Render the pictures that are due, and map those that have arrived."""
         if self._positions is not None and now_s >= self._next_s:
@@ -99,9 +107,11 @@ class SentPictures:
     ) -> None:
         """mounts: by camera, before those that are sent. perceive: makes an empty map. errors: of the cameras."""
         self._remote, self._robot, self._mounts, self._errors = remote, robot, mounts, errors
-        self.perception = perceive()
+        self.perception, self._perceive = perceive(), perceive
         self._motion: deque[tuple[float, FloatArray, FloatArray]] = deque()
         self._cameras: dict[str, int] = {}
+        self._taken_s: dict[str, tuple[float, float]] = {}
+        """Earliest and latest time of each camera's newest picture"""
 
     def hear(self, joints: Joints) -> None:
         """Take where the robot was."""
@@ -114,14 +124,24 @@ class SentPictures:
         """Change the role of a surface."""
         self.perception.set_role(name, role)
 
+    def forget(self) -> None:
+        """Forget what was seen."""
+        self.perception = self._perceive()
+
     def step(self, now_s: float) -> News | None:
         """Map the pictures that have arrived."""
-        taken_s: tuple[float, float] | None = None
+        news = False
         for camera in self._remote.update(now_s):
             taken = self._remote.take(camera)
             if taken is not None and self._map(camera, taken, now_s):
-                taken_s = taken.picture.taken_s, taken.latest_s
-        return None if taken_s is None else News(self.perception.changes(self._robot.tool_m()), taken_s)
+                self._taken_s[camera] = taken.picture.taken_s, taken.latest_s
+                news = True
+        if not news:
+            return None
+        # The map is as old as the newest picture of the camera that is furthest behind, but for those that are silent.
+        taken_s = min(times for times in self._taken_s.values() if now_s - times[1] <= _LATE_S)
+        holds = len(self._robot.held) > 0
+        return News(self.perception.changes(self._robot.tool_m(), holds=holds), taken_s)
 
     def _map(self, camera: str, taken: TakenDepth, now_s: float) -> bool:
         """Map a picture; False if it is too old, or nobody knows where its camera was."""
@@ -130,16 +150,20 @@ class SentPictures:
         if mount is None and sent is not None:
             mount = LinkMount(sent.position_m, sent.quaternion, sent.link)
         if mount is None:
-            self._remote.refuse(camera, f"no mount is known; valid: [depth.mounts.{camera}], or mount in it", now_s)
+            text = f"no mount is known; valid: [depth.mounts.{camera}], or mount in it"
+            self._remote.refuse("mount", camera, text, now_s)
             return False
         middle_s = 0.5 * (taken.picture.taken_s + taken.latest_s)
+        if now_s - middle_s > _LATE_S:
+            text = f"{now_s - middle_s:.1f} s old; valid: up to {_LATE_S:g} s"
+            self._remote.refuse("late", camera, text, now_s)
         if not self._motion or now_s - middle_s > _LATE_S:
             return False
         self._robot.pose(*self._joints_at(middle_s))
         try:
             pose = self._robot.camera(mount.link, mount)
         except ConfigurationError as error:
-            self._remote.refuse(camera, str(error), now_s)
+            self._remote.refuse("mount", camera, str(error), now_s)
             return False
         number = self._cameras.setdefault(camera, len(self._cameras))
         self.perception.see(taken.picture, pose, self._robot.body(), self._errors, number)

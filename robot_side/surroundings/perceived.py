@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any, Final, Protocol
+from typing import TYPE_CHECKING, Any, Final, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -121,6 +121,15 @@ class SomeObjects(Protocol):
     @property
     def at_first(self) -> FloatArray:
         """Numbers of these objects in the frame `first`"""
+        ...
+
+
+@runtime_checkable
+class PutBack(Protocol):
+    """Source that can forget what was seen."""
+
+    def put_back(self) -> None:
+        """Forget what was seen, as the objects were put back."""
         ...
 
 

@@ -9,6 +9,8 @@ from robot_side.surroundings.kinds.layout import HALF_SPACE, TETRAHEDRON
 from robot_side.surroundings.perceived import PerceivedObjects
 from robot_side.surroundings.scene_table import SceneTable
 
+_FARTHEST_M = 100.0
+"""Distance along the approach from which on nothing is a next target, such as parked surfaces"""
 _OFF_AXIS_WEIGHT = 3.0
 """Factor by which distances across the approach axis count more than along it, when objects are ordered by nearness"""
 
@@ -72,7 +74,7 @@ def next_target(
     eligible = [
         index
         for index, role in enumerate(objects.roles)
-        if (role is Role.OBSTACLE and along[index] > 0.0 and not is_fixed(objects.names[index]))
+        if (role is Role.OBSTACLE and 0.0 < along[index] < _FARTHEST_M and not is_fixed(objects.names[index]))
         or (role is Role.TARGET and np.isfinite(along[index]))
     ]
     order = sorted(eligible, key=lambda index: along[index] + _OFF_AXIS_WEIGHT * across[index])

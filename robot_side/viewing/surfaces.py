@@ -8,6 +8,8 @@ from robot_side.drivers.mujoco.scene import Scene
 from robot_side.surroundings.perceived import PerceivedObjects
 from robot_side.viewing.shapes import SceneModel
 
+_SPECK_M = 0.001
+"""Half size up to which a box is a piece of the target that is not in use"""
 _PARKED_BELOW_M = -100.0
 """Height below which no surface is: unused ones are parked there"""
 
@@ -16,17 +18,20 @@ class SurfaceModel(SceneModel):
     """Links of a scene's robot, surfaces, and the fixed objects behind these."""
 
     def __init__(self, scene: Scene, fixed: PerceivedObjects, surfaces: int) -> None:
-        """surfaces: number of slots. fixed: as for SceneModel."""
+        """surfaces: number of objects of the pool. fixed: as for SceneModel."""
         super().__init__(scene, fixed)
         self.surfaces, self.objects, self._geoms = surfaces, fixed.names, []
         self.may_move = np.arange(len(fixed.names))
 
 
-def seen_surfaces(objects: PerceivedObjects, slots: int) -> tuple[bytes, bytes]:
-    """Return the surfaces among the first `slots` objects of a frame, and their roles, as SceneState has them."""
-    used = np.flatnonzero(objects.box_centers_m[:slots, 2] > _PARKED_BELOW_M)
+def seen_surfaces(objects: PerceivedObjects, count: int) -> tuple[bytes, bytes]:
+    """Return the boxes of the first `count` objects of a frame, and their roles, as SceneState has them."""
+    seen = (objects.box_centers_m[:, 2] > _PARKED_BELOW_M) & (objects.box_object < count)
+    used = np.flatnonzero(seen & (objects.box_half_sizes_m.max(axis=1) > _SPECK_M))
     if not used.size:
         return b"", b""
     turned = Rotation.from_matrix(objects.box_rotations[used]).as_quat(scalar_first=True)
     rows = np.concatenate([objects.box_centers_m[used], turned, objects.box_half_sizes_m[used]], axis=1)
-    return rows.astype("<f4").tobytes(), bytes(ROLES.index(objects.roles[index]) for index in used.tolist())
+    return rows.astype("<f4").tobytes(), bytes(
+        ROLES.index(objects.roles[index]) for index in objects.box_object[used].tolist()
+    )

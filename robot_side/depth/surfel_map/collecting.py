@@ -64,7 +64,7 @@ def _new_surfel(surfels: SurfelColumns, slot: np.ndarray, cell: int, counts: Int
     surfels.cells[row] = cell
     surfels.weights[row] = 0.0
     surfels.evidence[row] = surfels.astray[row] = surfels.shown[row] = surfels.seen[row] = 0
-    surfels.roles[row] = _NO_ROLE
+    surfels.roles[row], surfels.pointed[row] = _NO_ROLE, 0
     counts[Count.MADE] += 1
     return row
 

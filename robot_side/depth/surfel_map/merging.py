@@ -107,7 +107,7 @@ def merge(
         surfels.evidence[row] = min(surfels.evidence[row] + 1, MOST_EVIDENCE)
         surfels.unanswered_s[row] = 0.0
         changed = False
-        if labelled and surfels.candidates[row] >= 0 and surfels.roles[row] != surfels.candidates[row]:
+        if labelled and surfels.pointed[row] == 0 and surfels.roles[row] != surfels.candidates[row]:
             surfels.roles[row] = surfels.candidates[row]
             changed = True
         if not surfels.shown[row] and surfels.evidence[row] >= APPEARS:

@@ -38,6 +38,8 @@ class SurfelColumns(NamedTuple):
     """(n,) successive pictures that put it elsewhere"""
     roles: IntArray
     """(n,) index in ROLES; -1: none"""
+    pointed: IntArray
+    """(n,) 1 if an operator gave it its role, which labels do not change"""
     seen: IntArray
     """(n,) number of the last picture that shows it"""
     shown: IntArray
@@ -58,7 +60,7 @@ SURFELS: Final = Declared(
     SurfelColumns,
     *(rows(3), rows(3), rows(6), rows(4)),
     *(NUMBERS,) * 4,
-    *(INDICES,) * 6,
+    *(INDICES,) * 7,
     rows(SUMS),
     *(INDICES,) * 4,
 )

@@ -19,6 +19,8 @@ _ROOM: Final = 200_000
 """Largest number of surfels"""
 _LONGEST_S: Final = 0.2
 """Most of the time between two pictures that counts as time without an answer"""
+_LEAST_ANSWERS: Final = 0.002
+"""Least share of a picture's pixels with depth, for time without an answer to count"""
 _NO_LABELS: Final = np.zeros((1, 1), dtype=np.uint8)
 
 
@@ -72,7 +74,10 @@ class SurfelMap:
         merge(view, picture.labels is not None, place, cells, self.bundle, counts, self.dirty)
         elapsed_s = picture.taken_s - self._taken_s.get(camera, picture.taken_s)
         self._taken_s[camera] = picture.taken_s
-        elapsed_s = min(max(elapsed_s, 0.0), _LONGEST_S)
+        elapsed_s = min(max(elapsed_s, 0.0), _LONGEST_S) / len(self._taken_s)
+        if np.count_nonzero(depth_m) < _LEAST_ANSWERS * depth_m.size:
+            # A covered lens says nothing about what was there.
+            elapsed_s = 0.0
         look_for_unseen(depth_m, own, view, elapsed_s, place, cells, self.slot, self.bundle, counts, self.dirty)
         found = (int(counts[kind]) for kind in (Count.MADE, Count.CONTRADICTED, Count.UNANSWERED, Count.FULL))
         return Merged(*found)

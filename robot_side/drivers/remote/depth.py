@@ -1,7 +1,7 @@
 """Depth pictures from separate processes that have the cameras, written in any language."""
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 from robot_side.depth.picture import DepthPicture
 from robot_side.drivers.remote.arm import Wire
@@ -47,6 +47,6 @@ class RemoteDepth:
         message, (earliest_s, latest_s) = newest
         return TakenDepth(message.picture(earliest_s), latest_s, message.mount)
 
-    def refuse(self, camera: str, text: str, now_s: float) -> None:
-        """Refuse the camera's picture that was taken last: its mount is none of ours."""
-        self.senders.refuse("mount", camera, text, now_s)
+    def refuse(self, why: Literal["mount", "late"], camera: str, text: str, now_s: float) -> None:
+        """Refuse the camera's picture that was taken last: its mount is none of ours, or it is too old."""
+        self.senders.refuse(why, camera, text, now_s)

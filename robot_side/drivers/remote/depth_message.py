@@ -20,6 +20,8 @@ DEPTH_VERSION: Final = 1
 DEPTH_LIMIT_BYTES: Final = 3 * 1024 * 1024
 """Enough for 1280 x 720 pixels with labels"""
 MOST_LABELS: Final = 255
+_LEAST_FOCAL, _MOST_FOCAL = 0.2, 20.0
+"""Limits of a focal length, in widths or heights of the picture: 136° and 3°"""
 _UNIT: Final = 0.01
 """Largest deviation of a quaternion's length from 1 that is accepted"""
 
@@ -96,6 +98,11 @@ def read_depth(payload: bytes) -> DepthMessage:
             shape = f"{message.width} x {message.height} pixels"
             text = f"valid: {each * pixels}, {each} for each of {shape}"
             raise RemoteProtocolError(f"{name} has {len(content)} bytes; {text}")
+    of = message.intrinsics
+    for name, focal, side in (("fx", of.fx, message.width), ("fy", of.fy, message.height)):
+        if not _LEAST_FOCAL * side <= focal <= _MOST_FOCAL * side:
+            valid = f"valid: {_LEAST_FOCAL * side:g} to {_MOST_FOCAL * side:g} pixels in pictures of this size"
+            raise RemoteProtocolError(f"intrinsics: {name} = {focal}; {valid}")
     if message.roles and message.labels is None:
         raise RemoteProtocolError("roles is there without labels; valid: both, or none")
     mount = message.mount

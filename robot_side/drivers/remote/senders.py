@@ -15,9 +15,11 @@ from robot_side.drivers.remote.sender_clock import UNBOUNDED_S, SenderClock, Sta
 
 SILENT_S: Final = 1.0
 """Time without a picture of a name, in seconds, after which a note is made, and another sender may send it"""
+MOST_NAMES: Final = 8
+"""Largest number of names under which pictures are taken in a run"""
 _REFUSAL_PERIOD_S: Final = 1.0
 
-Why = Literal["second", "version", "malformed", "order", "clock", "undecodable", "mount"]
+Why = Literal["second", "version", "malformed", "order", "clock", "undecodable", "mount", "late"]
 Name = TypeVar("Name", bound=str)
 _Message = TypeVar("_Message")
 
@@ -64,6 +66,9 @@ class Senders(Generic[Name]):
         None if it was refused: from a second sender, out of order, or with stamps that cannot be.
         """
         sender = self._senders.get(name)
+        if sender is None and len(self._senders) >= MOST_NAMES:
+            self.reject("second", f"{name} is one too many; valid: {MOST_NAMES} names at most", peer, now_s)
+            return None
         if sender is not None and received_s - sender.heard_s <= SILENT_S:
             if peer != sender.peer:
                 self.reject("second", f"another camera sends {name}, too; valid: one at a time", peer, now_s)

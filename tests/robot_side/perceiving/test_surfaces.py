@@ -16,6 +16,7 @@ from robot_side.depth.frames import SurfaceFrames
 from robot_side.depth.settings import MapSettings
 from robot_side.depth.slots import PIECES, SlotChanges, Slots
 from robot_side.perceiving.exchange import (
+    Forget,
     Joints,
     Note,
     Ready,
@@ -56,6 +57,15 @@ class FakeCompanion:
     def show(self, changes: SlotChanges, taken_s: float) -> None:
         self.say(surfaces(changes, (taken_s, taken_s), {"holes": 3.0}))
 
+    def show_four(self, count: int, taken_s: float) -> None:
+        """Show a new map of this many boxes, by as many pictures as it needs."""
+        slots = Slots(SLOTS)
+        for _ in range(4):
+            self.show(slots.update(_boxes(count), NEAR), taken_s)
+
+    def works(self) -> bool:
+        return True
+
 
 class Desk:
     """A robot side's end, the companions that it started, and the lines that it told."""
@@ -80,7 +90,7 @@ class Desk:
         self.look(now_s - 1.0)
         companion = self.companions[-1]
         companion.say(Ready(""))
-        companion.show(Slots(SLOTS).update(_boxes(3), NEAR), now_s - 1.0)
+        companion.show_four(3, now_s - 1.0)
         self.look(now_s - 1.0)
         self.look(now_s)
         return companion
@@ -130,10 +140,13 @@ def test_nothing_is_perceived_until_the_first_map_has_grown_for_half_a_second(de
     with pytest.raises(FeelaheadError, match="no depth picture has been mapped yet"):
         desk.end.perceive(0.0)
     companion = desk.companions[0]
-    companion.show(Slots(SLOTS).update(_boxes(3), NEAR), 0.0)
+    slots = Slots(SLOTS)
+    companion.show(slots.update(_boxes(3), NEAR), 0.0)
     assert desk.look(0.1) is None
-    assert desk.look(0.4) is None
-    frame = desk.look(0.7)
+    assert desk.look(0.9) is None
+    for _ in range(3):
+        companion.show(slots.update(_boxes(3), NEAR), 0.0)
+    frame = desk.look(1.0)
     np.testing.assert_array_equal(frame.box_centers_m[PIECES : PIECES + 3], _boxes(3).centers_m)
 
 
@@ -171,11 +184,11 @@ def test_a_companion_that_dies_is_started_again_and_what_was_seen_stays_until_th
     assert any("started again" in text for text in desk.notes)
     desk.look(12.2)
     assert len(desk.companions) == 2
-    fresh = Slots(SLOTS)
-    desk.companions[1].show(fresh.update(_boxes(1), NEAR), 12.3)
-    still = desk.look(12.4)
+    desk.companions[1].show_four(1, 12.3)
+    still = desk.look(14.0)
     assert np.count_nonzero(still.box_centers_m[:, 2] > -100.0) == 3
-    new = desk.look(13.0)
+    new = desk.look(16.1)
+    assert "what no camera sees now is forgotten" in desk.notes[-1]
     assert np.count_nonzero(new.box_centers_m[:, 2] > -100.0) == 1
 
 
@@ -206,6 +219,31 @@ def test_a_refusal_once_there_is_a_map_is_a_line(desk: Desk) -> None:
     assert "depth: no EGL" in desk.notes
 
 
+def test_a_companion_that_does_not_compute_is_replaced(desk: Desk, monkeypatch: pytest.MonkeyPatch) -> None:
+    companion = desk.begin(10.0)
+    monkeypatch.setattr(companion, "works", lambda: False)
+    desk.look(13.0)
+    assert len(desk.companions) == 1
+    desk.look(15.0)
+    desk.look(18.0)
+    assert len(desk.companions) == 2
+
+
+def test_without_pictures_a_companion_that_is_ready_is_left_alone(desk: Desk) -> None:
+    desk.look(0.0)
+    desk.companions[0].say(Ready("tcp://127.0.0.1:5604"))
+    for second in range(1, 200, 5):
+        desk.look(float(second))
+    assert len(desk.companions) == 1
+
+
+def test_what_was_seen_is_forgotten_when_the_objects_are_put_back(desk: Desk) -> None:
+    companion = desk.begin(10.0)
+    companion.heard()
+    desk.end.put_back()
+    assert companion.heard() == [Forget()]
+
+
 def test_the_companions_lines_are_told(desk: Desk) -> None:
     desk.begin(10.0).say(Note("depth pictures: one was refused"))
     desk.look(10.1)
@@ -217,9 +255,9 @@ def test_the_summary_has_ages_and_the_newest_pictures_figures(desk: Desk) -> Non
     companion.show(Slots(SLOTS).update(_boxes(3), NEAR), 9.9)
     desk.look(10.0)
     summary = desk.end.summary()
-    assert summary["frames"] == 2
+    assert summary["frames"] == 5
     assert summary["newest"] == {"holes": 3.0, "crowded_out": 0.0}
-    assert summary["age_ms"]["p99"] == pytest.approx(99.0)
+    assert summary["age_ms"]["p99"] == pytest.approx(96.0)
 
 
 def test_roles_are_those_of_the_slots(desk: Desk) -> None:

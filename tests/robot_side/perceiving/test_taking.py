@@ -35,8 +35,8 @@ class FakeRemote:
     def take(self, camera: str) -> TakenDepth | None:
         return self.waiting.pop(camera, None)
 
-    def refuse(self, camera: str, text: str, now_s: float) -> None:
-        del now_s
+    def refuse(self, why: str, camera: str, text: str, now_s: float) -> None:
+        del now_s, why
         self.refused.append((camera, text))
 
 

@@ -39,7 +39,7 @@ def seen(count: int = 3) -> PerceivedObjects:
         sds_m=np.full(count, 0.001),
     )
     shown.apply(mapped.update(boxes, np.zeros(3)))
-    return shown.frame(0.0, np.full(SLOTS, 0.003))
+    return shown.frame(0.0, np.full(len(shown.sds_m), 0.003))
 
 
 def rows_of(state: SceneState) -> "np.ndarray[tuple[int, int], np.dtype[np.float32]]":
@@ -55,7 +55,7 @@ class Viewer:
         self.parts = build_parts(RobotSettings(arm_keep_out=(keep_out,)), 1, "clock")
         self.robot = RobotSide(self.parts)
         self.robot.tick(0.0)
-        model = SurfaceModel(self.parts.scene, self.parts.fixed, SLOTS)
+        model = SurfaceModel(self.parts.scene, self.parts.fixed, 1 + SLOTS)
         parts = self.parts
         self.view = SceneView(model, parts.kinematics, parts.explains, parts.enlarged, parts.surroundings)
         self.show(seen())
@@ -83,13 +83,13 @@ def viewer() -> Viewer:
 
 
 def test_used_surfaces_are_shown_with_their_roles_and_no_parked_one() -> None:
-    surfaces, roles = seen_surfaces(seen(), SLOTS)
+    surfaces, roles = seen_surfaces(seen(), 1 + SLOTS)
     rows = np.frombuffer(surfaces, "<f4").reshape(-1, 10)
-    assert rows[:, :3] == pytest.approx(np.array([[0.0, 0.2, 0.3], [0.1, 0.2, 0.3], [0.2, 0.2, 0.3]]))
+    assert rows[:, :3] == pytest.approx(np.array([[0.1, 0.2, 0.3], [0.0, 0.2, 0.3], [0.2, 0.2, 0.3]]))
     assert rows[:, 3:7] == pytest.approx(np.tile([np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5)], (3, 1)))
     assert rows[:, 7:] == pytest.approx(np.tile([0.04, 0.03, 0.002], (3, 1)))
-    assert [ROLES[role] for role in roles] == [Role.OBSTACLE, Role.TARGET, Role.SUPPORT]
-    assert seen_surfaces(seen(0), SLOTS) == (b"", b"")
+    assert [ROLES[role] for role in roles] == [Role.TARGET, Role.OBSTACLE, Role.SUPPORT]
+    assert seen_surfaces(seen(0), 1 + SLOTS) == (b"", b"")
 
 
 def test_shapes_have_what_is_fixed_and_stay_when_surfaces_come_and_go(viewer: Viewer) -> None:

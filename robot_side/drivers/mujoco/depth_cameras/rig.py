@@ -119,7 +119,14 @@ class DepthRig:
         while self._under_way and self._under_way[0].arrives_s <= now_s + _SOON_S:
             newest = self._under_way.popleft()
             self.perception.see(newest.picture, newest.pose, newest.body, self._errors, newest.eye)
-        return None if newest is None else (self.perception.changes(newest.tool_m), newest.picture.taken_s)
+        return (
+            None
+            if newest is None
+            else (
+                self.perception.changes(newest.tool_m, holds=len(self._robot.held) > 0),
+                newest.picture.taken_s,
+            )
+        )
 
     def close(self) -> None:
         """Free the graphics resources."""

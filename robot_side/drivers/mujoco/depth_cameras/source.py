@@ -50,3 +50,5 @@ class SimulatedDepth(Listener):
 
     def set_role(self, name: str, role: Role) -> None:
         """Change the role of the object `name` from the next frame on."""
+        if self._rig is not None:
+            self._rig.perception.set_role(name, role)

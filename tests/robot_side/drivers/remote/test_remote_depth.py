@@ -160,7 +160,7 @@ def test_a_mount_on_no_link_of_ours_is_refused_by_its_camera() -> None:
     cameras = Cameras()
     cameras.sends(mount=MOUNT)
     cameras.take()
-    cameras.depth.refuse("wrist", "link = 'hand'; valid: world, arm", cameras.now_s)
+    cameras.depth.refuse("mount", "wrist", "link = 'hand'; valid: world, arm", cameras.now_s)
     assert cameras.depth.senders.summary() == {"accepted": 1, "mount": 1}
     assert cameras.answers == [{"version": 1, "refused": "wrist: link = 'hand'; valid: world, arm"}]
 
