@@ -21,6 +21,8 @@ from robot_side.depth.surfel_map.surfel_columns import Count, surfels_at
 from robot_side.depth.view import LEAST, MASK, MOST, PICTURE, pixel_of, pixels_across, sd_at, to_camera
 
 _SIGMAS: Final = 3.0
+_UNCONFIRMED: Final = 90
+"""Pictures, of all cameras, after which a surfel that only one of them showed is forgotten"""
 _UNANSWERED_S: Final = 1.9
 """Time in view without an answer after which a surfel is gone: with the next picture, within 2 s"""
 _MOST_HOLES: Final = 4
@@ -75,6 +77,12 @@ def look_for_unseen(
             continue
         a = to_camera(view, load(surfels.points_m, row))
         sd = sd_at(view, a[2])
+        if not surfels.shown[row] and counts[Count.PICTURE] - surfels.seen[row] > _UNCONFIRMED:
+            slot[surfels.cells[row]] = -1
+            surfels.cells[row] = -1
+            surfels.free[counts[Count.FREE]] = row
+            counts[Count.FREE] += 1
+            continue
         if a[2] < _NEAR * view[LEAST] + edge + _SIGMAS * sd or a[2] > view[MOST] - _SIGMAS * sd:
             continue
         i, j = pixel_of(view, a)
@@ -95,9 +103,7 @@ def look_for_unseen(
             surfels.evidence[row] -= 1
             gone = surfels.evidence[row] <= 0
             counts[Count.CONTRADICTED] += gone
-        elif pixels_across(view, edge, a[2]) >= _FINE and (
-            not surfels.shown[row] or least > a[2] - _HIDDEN * sd - edge
-        ):
+        elif pixels_across(view, edge, a[2]) >= _FINE and least > a[2] - _HIDDEN * sd - edge:
             # Something is measured about there, but at other surfels, and so often that it is noise.
             surfels.unanswered_s[row] += elapsed_s
             gone = not surfels.shown[row] or surfels.unanswered_s[row] > _UNANSWERED_S

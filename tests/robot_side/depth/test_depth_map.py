@@ -205,3 +205,16 @@ def test_each_box_has_the_least_error_of_its_pixels() -> None:
     near_m = watching.map.boxes().sds_m
     assert far.min() == pytest.approx(AHEAD.errors.sd_m(0.6), rel=0.02)
     assert near_m.min() == pytest.approx(AHEAD.errors.sd_m(0.3), rel=0.02)
+
+
+def test_what_one_camera_sees_behind_a_post_stays_although_the_other_sees_only_the_post() -> None:
+    watching = _watching()
+    post = Box((0.4, 0.0, 0.4), (0.02, 0.08, 0.5))
+    aside = Camera(looking((0.4, 0.45, 0.4), (0.6, 0.0, 0.4)))
+    for _ in range(6):
+        for number, camera in enumerate((AHEAD, aside)):
+            picture = camera.picture([WALL, post], watching.time_s, np.random.default_rng(number))
+            watching.map.integrate(picture, camera.pose, NOBODY, camera.errors, number)
+        watching.time_s += 0.033
+    # Straight behind the post, where the camera ahead sees the post alone.
+    assert near(watching.map.boxes(), (0.61, 0.0, 0.4), 0.09) > 0
