@@ -16,7 +16,7 @@ from robot_side.drivers.mujoco.depth_cameras.posed_robot import PosedRobot, Robo
 from robot_side.drivers.mujoco.depth_cameras.rig import DepthRig
 from robot_side.drivers.mujoco.drawing.off_screen import REMEDY
 from robot_side.drivers.mujoco.encoders import Encoder
-from robot_side.drivers.remote.depth import RemoteDepth, TakenDepth
+from robot_side.drivers.remote.depth import RemoteDepth
 from robot_side.perceiving.exchange import Joints
 from robot_side.perceiving.taking import SentPictures, SimulatedPictures, Taking
 
@@ -34,17 +34,6 @@ class Watched(NamedTuple):
     """Number of refused pictures by reason"""
 
 
-class _NamedDepth(RemoteDepth):
-    """Pictures from separate processes, which tells whose was taken last."""
-
-    newest = ""
-
-    def take(self, camera: str) -> TakenDepth | None:
-        """Return the newest picture of a camera."""
-        self.newest = camera
-        return super().take(camera)
-
-
 def watch_depth(one: ArmAlone, seconds: float, say: Callable[[str], None]) -> Watched:
     """Look at the pictures of the settings' cameras, for `seconds` from the first one on.
 
@@ -54,13 +43,15 @@ def watch_depth(one: ArmAlone, seconds: float, say: Callable[[str], None]) -> Wa
     warm_up(kernels=[kernel for kernel in imported_kernels() if kernel.name.startswith(_KERNELS)])
     looked, scene = LookedAt(), one.parts.scene
     with ExitStack() as stack:
-        remote: _NamedDepth | None = None
+        remote: RemoteDepth | None = None
         if one.depth is None:
             pictures: Taking = stack.enter_context(_simulated(one, looked))
-            names = dict(enumerate(eye.name for eye in simulated_eyes(scene, one.settings.depth_camera.eyes)))
+            eyes = simulated_eyes(scene, one.settings.depth_camera.eyes)
+            numbers = {eye.name: number for number, eye in enumerate(eyes)}
         else:
-            remote = _NamedDepth(one.depth, say)
-            pictures, names = _sent(one, remote, looked), {}
+            remote = RemoteDepth(one.depth, say)
+            pictures = sent = _sent(one, remote, looked)
+            numbers = sent.cameras
             say(f"waiting for depth pictures at {one.depth.endpoint}")
         robot, start = scene.robot, scene.data.qpos
         arm_rad, fingers = start[robot.arm_positions], start[robot.finger_positions]
@@ -78,10 +69,10 @@ def watch_depth(one: ArmAlone, seconds: float, say: Callable[[str], None]) -> Wa
             new = looked.figures.keys() - known
             if new and not known:
                 end_s = now_s + seconds
-            if remote is not None:
-                names |= dict.fromkeys(new, remote.newest)
     refused = {} if remote is None else {str(why): count for why, count in remote.senders.rejected.items()}
-    return Watched({names[number]: figures for number, figures in looked.figures.items()}, refused)
+    return Watched(
+        {name: looked.figures[number] for name, number in numbers.items() if number in looked.figures}, refused
+    )
 
 
 def _sent(one: ArmAlone, remote: RemoteDepth, looked: LookedAt) -> SentPictures:

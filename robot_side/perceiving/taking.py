@@ -109,7 +109,8 @@ class SentPictures:
         self._remote, self._robot, self._mounts, self._errors = remote, robot, mounts, errors
         self.perception, self._perceive = perceive(), perceive
         self._motion: deque[tuple[float, FloatArray, FloatArray]] = deque()
-        self._cameras: dict[str, int] = {}
+        self.cameras: dict[str, int] = {}
+        """Numbers of the cameras whose pictures were mapped, by name"""
         self._taken_s: dict[str, tuple[float, float]] = {}
         """Earliest and latest time of each camera's newest picture"""
 
@@ -165,7 +166,7 @@ class SentPictures:
         except ConfigurationError as error:
             self._remote.refuse("mount", camera, str(error), now_s)
             return False
-        number = self._cameras.setdefault(camera, len(self._cameras))
+        number = self.cameras.setdefault(camera, len(self.cameras))
         self.perception.see(taken.picture, pose, self._robot.body(), self._errors, number)
         return True
 
