@@ -43,7 +43,7 @@ _NEW_MAP_S: Final = 2.0
 _NEW_MAP_PICTURES: Final = 4
 """Least number of pictures of a map that is shown: a surface is there from its second on"""
 _RETRY_S: Final = 2.0
-_HANGS_S: Final = 5.0
+_HANGS_S: Final = 20.0
 """Time without a picture, in seconds, after which a companion that does not compute is taken to hang"""
 _SILENT_S: Final = 60.0
 """Time to the first answer of a companion, in seconds, from which on it is taken to hang: it may compile"""

@@ -222,10 +222,10 @@ def test_a_refusal_once_there_is_a_map_is_a_line(desk: Desk) -> None:
 def test_a_companion_that_does_not_compute_is_replaced(desk: Desk, monkeypatch: pytest.MonkeyPatch) -> None:
     companion = desk.begin(10.0)
     monkeypatch.setattr(companion, "works", lambda: False)
-    desk.look(13.0)
+    desk.look(28.0)
     assert len(desk.companions) == 1
-    desk.look(15.0)
-    desk.look(18.0)
+    desk.look(30.0)
+    desk.look(33.0)
     assert len(desk.companions) == 2
 
 
