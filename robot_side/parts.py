@@ -251,7 +251,7 @@ def _notes(scene: Scene, settings: RobotSettings, travel: GripperTravel | None) 
     if settings.model is not None:
         notes += site_findings(scene, settings.site_axis, travel)
         notes += start_collision(scene) if settings.arm is None else []
-    if settings.objects is not None:
+    if settings.objects is not None or settings.depth is not None:
         return tuple(notes)
     notes.append(f"objects: {_roles(scene.roles)}")
     if scene.model.nflex:
