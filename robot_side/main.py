@@ -83,7 +83,7 @@ def command(arguments: Sequence[str], adapt: Callable[[RobotParts], Adapted] = a
             process.stack.callback(log.close)
         door = process.stack.enter_context(Door(ports, process.note))
         drivers = ConnectedDrivers(door, process.note)
-        drivers.surfaces = surfaces = process.stack.enter_context(surfaced(settings, process.note))
+        drivers.surfaces = surfaces = process.stack.enter_context(surfaced(settings, process.note, loop.clock.now()))
         parts = build_parts(settings, epoch, clock_domain(), announce=process.note, drivers=drivers, surfaces=surfaces)
         door.ready()
         recorder = [] if recording is None else [RobotRecorder(recording.noted.append)]

@@ -1,7 +1,7 @@
 """Making of the parts of a robot side from its settings. Arm and objects are simulated or come from drivers."""
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -160,7 +160,7 @@ def build_parts(
             Safety(settings.safety),
             settings.seed,
             Tuning(settings.probability, expect if settings.permit_tuning else None),
-            _episodes(settings, arm, [camera, source]),
+            _episodes(settings, arm, dict.fromkeys((camera, source))),
         ),
         loop_age=LoopAge(settings.assumed_delay_s),
         limits=limits,
@@ -198,7 +198,7 @@ def take_limits(settings: RobotSettings, parts: SceneParts, drivers: ConnectedDr
     return replace(settings, arm_limits=limits), f"the arm's limits: {given.sources(said)}"
 
 
-def _episodes(settings: RobotSettings, arm: MujocoArm | RemoteArm, sources: Sequence[ObjectSource]) -> Episodes:
+def _episodes(settings: RobotSettings, arm: MujocoArm | RemoteArm, sources: Iterable[ObjectSource]) -> Episodes:
     """Return the judge of marks: a driver's arm does not go home by itself, nor do objects that are seen elsewhere."""
     driven = [f"--{what}" for what in ("arm", "objects", "depth") if getattr(settings, what) is not None]
     if driven or not isinstance(arm, MujocoArm):

@@ -1,6 +1,7 @@
 """From pictures to surfaces that are handed on: the map, and a fixed pool of objects that shows it."""
 
 from dataclasses import asdict
+from typing import Final
 
 from common.arrays import FloatArray
 from common.roles import Role
@@ -8,6 +9,9 @@ from robot_side.depth.depth_map import DepthMap, Integrated
 from robot_side.depth.picture import CameraPose, DepthErrors, DepthPicture, OwnBody
 from robot_side.depth.settings import MapSettings
 from robot_side.depth.slots import EXACT, TARGET_NAME, SlotChanges, Slots
+
+_AROUND_M: Final = (0.06, 0.25)
+"""Half width of the gripper's section, and reach, within which unseen space is told"""
 
 
 class DepthPerception:
@@ -43,6 +47,13 @@ class DepthPerception:
         elif (box := self._slots.box_of(name)) is not None:
             self._map.mark(box, role)
 
-    def newest(self) -> dict[str, float]:
-        """Return what the newest picture did, by name."""
-        return {} if self.last is None else {name: float(value) for name, value in asdict(self.last).items()}
+    def newest(self, tool_m: FloatArray, rotation: FloatArray) -> dict[str, float]:
+        """Return what the newest picture did, and the shares of the space around the tool that nobody has seen.
+
+        tool_m (3,), rotation (3, 3): pose of the tool, which advances along its z.
+        """
+        if self.last is None:
+            return {}
+        unknown = asdict(self._map.seen.unknown(tool_m, rotation, *_AROUND_M))
+        did = {name: float(value) for name, value in asdict(self.last).items()}
+        return did | {f"unknown_{direction}": share for direction, share in unknown.items()}

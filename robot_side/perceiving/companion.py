@@ -16,6 +16,7 @@ from common.companion.process import companion_channel
 from common.errors import FeelaheadError
 from common.realtime.priority import lower_priority
 from common.sockets.door.client import Door
+from robot_side.compiled.kernel import imported_kernels
 from robot_side.compiled.warm_up import warm_up
 from robot_side.depth.camera_settings import DEPTH_PORT
 from robot_side.depth.perception import DepthPerception
@@ -44,6 +45,7 @@ _NICENESS: Final = -5
 """Above ordinary programs, as what is felt waits for it; below the sides"""
 _WAIT_S: Final = 0.02
 _LONGEST_REASON: Final = 300
+_KERNELS: Final = "robot_side.depth."
 
 
 def main() -> None:
@@ -93,10 +95,9 @@ def _prepared(setup: Setup, channel: Channel, stack: ExitStack) -> tuple[Taking,
         errors = SENSORS[setup.camera.sensor].depth_errors(setup.camera.noise)
         taking = SentPictures(remote, robot, setup.mounts, lambda: DepthPerception(setup.mapped), errors)
         wait = door.wait
-        warm_up()
         door.ready()
         endpoint = door.ports[DEPTH_PORT].endpoint
-    warm_up()
+    warm_up(kernels=[kernel for kernel in imported_kernels() if kernel.name.startswith(_KERNELS)])
     channel.send(encode(Ready(endpoint)))
     return taking, wait
 
@@ -128,7 +129,7 @@ def _serve(channel: Channel, taking: Taking, wait: Callable[[float], object], wa
         if news is not None:
             # What has not been sent is lost, and all is sent instead.
             changes = news.changes if all_sent else taking.perception.whole()
-            all_sent = channel.send(encode(surfaces(changes, news.taken_s, taking.perception.newest())))
+            all_sent = channel.send(encode(surfaces(changes, news.taken_s, taking.newest())))
         wait(_WAIT_S)
 
 

@@ -32,12 +32,16 @@ def setup_of(settings: RobotSettings) -> Setup:
 
 
 @contextmanager
-def surfaced(settings: RobotSettings, note: Callable[[str], None]) -> Iterator[Surfaced | None]:
-    """Yield the source of what depth cameras see; None if the settings want none. note: as for Surfaced."""
+def surfaced(settings: RobotSettings, note: Callable[[str], None], now_s: float) -> Iterator[Surfaced | None]:
+    """Yield the source of what depth cameras see; None if the settings want none. note: as for Surfaced.
+
+    The companion process starts at once, and so loads and compiles beside the robot side's own start.
+    """
     if not settings.by_depth:
         yield None
         return
     source = Surfaced(setup_of(settings), partial(surface_frames, settings), note)
+    source.begin(now_s)
     try:
         yield source
     finally:

@@ -45,8 +45,8 @@ _NEW_MAP_PICTURES: Final = 4
 _RETRY_S: Final = 2.0
 _HANGS_S: Final = 20.0
 """Time without a picture, in seconds, after which a companion that does not compute is taken to hang"""
-_SILENT_S: Final = 60.0
-"""Time to the first answer of a companion, in seconds, from which on it is taken to hang: it may compile"""
+_SILENT_S: Final = 180.0
+"""Time to the first answer of a companion, in seconds, from which on it is taken to hang: slow machines compile long"""
 
 
 class Surfaced(Listener):
@@ -110,6 +110,12 @@ class Surfaced(Listener):
                 encode(Joints(state.time_s, *joints, b"" if held is None else held.tobytes(), positions))
             )
 
+    def begin(self, now_s: float) -> None:
+        """Start a companion."""
+        self._begins_s, self._is_new, self._is_ready, self._pictures = now_s, True, False, 0
+        self._companion = self._start()
+        self._companion.channel.send(self._setup)
+
     def wait(self, arm: Arm, scene: Scene, clock: Clock, meanwhile: Callable[[], object]) -> None:
         """Wait for the first map, however long; a signal ends the wait. meanwhile: called some 100 times a second.
 
@@ -130,9 +136,7 @@ class Surfaced(Listener):
         companion = self._companion
         if companion is None:
             if now_s >= self._begins_s:
-                self._begins_s, self._is_new, self._is_ready, self._pictures = now_s, True, False, 0
-                self._companion = self._start()
-                self._companion.channel.send(self._setup)
+                self.begin(now_s)
             return
         for payload in companion.channel.receive():
             self._take(payload, now_s)

@@ -41,6 +41,10 @@ class Taking(Protocol):
         """Map of the pictures"""
         ...
 
+    def newest(self) -> dict[str, float]:
+        """Return the figures of the newest picture."""
+        ...
+
     def hear(self, joints: Joints) -> None:
         """Take where the robot was."""
         ...
@@ -71,6 +75,10 @@ class SimulatedPictures:
     def perception(self) -> DepthPerception:
         """Map of the pictures"""
         return self._rig.perception
+
+    def newest(self) -> dict[str, float]:
+        """Return the figures of the newest picture."""
+        return self._rig.newest()
 
     def hear(self, joints: Joints) -> None:
         """Take where everything was."""
@@ -120,6 +128,10 @@ class SentPictures:
         self._motion.append((joints.time_s, np.frombuffer(joints.arm), np.frombuffer(joints.fingers)))
         while self._motion[0][0] < joints.time_s - _REMEMBERED_S:
             self._motion.popleft()
+
+    def newest(self) -> dict[str, float]:
+        """Return the figures of the newest picture."""
+        return self.perception.newest(self._robot.tool_m(), self._robot.tool_rotation())
 
     def set_role(self, name: str, role: Role) -> None:
         """Change the role of a surface."""

@@ -7,9 +7,7 @@ from typing import Annotated, Final
 import msgspec
 import numpy as np
 from msgspec import UNSET, Meta, Struct, UnsetType
-from scipy.spatial.transform import Rotation
 
-from common.arrays import FloatArray
 from common.errors import RemoteProtocolError
 from common.roles import Role
 from robot_side.depth.picture import DepthArray, DepthPicture, Pinhole
@@ -41,11 +39,6 @@ class SentMount(Struct, frozen=True, forbid_unknown_fields=True):
     position_m: tuple[_Coordinate, _Coordinate, _Coordinate]
     quaternion: tuple[_Coordinate, _Coordinate, _Coordinate, _Coordinate]
     """From the camera's frame, whose x is right, y down and z ahead in its picture; w first"""
-
-    def rotation(self) -> FloatArray:
-        """Return the rotation (3, 3) from the camera's frame to the link's."""
-        turned: FloatArray = Rotation.from_quat(self.quaternion, scalar_first=True).as_matrix()
-        return turned
 
 
 class DepthMessage(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):

@@ -77,7 +77,7 @@ def test_a_name_without_a_surface_changes_nothing() -> None:
     assert pointing.look().roles == before.roles
 
 
-def test_a_part_of_a_large_surface_is_taken_near_the_middle_of_its_box() -> None:
+def test_an_object_is_found_by_its_name_and_one_without_a_box_is_not() -> None:
     slots = Slots(64)
     boxes = Boxes(
         ids=np.array([7]),
@@ -90,3 +90,13 @@ def test_a_part_of_a_large_surface_is_taken_near_the_middle_of_its_box() -> None
     slots.update(boxes, NEAR)
     assert slots.box_of(TARGET_NAME) == 7
     assert slots.box_of("surface 1") is None
+
+
+def test_the_figures_of_a_picture_tell_which_space_around_the_tool_nobody_has_seen() -> None:
+    ahead = looking((0.3, 0.0, 0.3), (0.5, 0.0, 0.1)).rotation
+    tool_m = np.array([0.3, -0.05, 0.4])
+    assert DepthPerception(SETTINGS).newest(tool_m, ahead) == {}
+    figures = Pointing().perception.newest(tool_m, ahead)
+    assert figures["boxes"] > 0.0
+    # What is ahead lies in the picture, what is behind the camera's back does not.
+    assert figures["unknown_ahead"] < 0.5 < figures["unknown_up"]

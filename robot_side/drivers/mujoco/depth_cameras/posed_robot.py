@@ -66,7 +66,7 @@ class PosedRobot:
         """Return the solids of the robot, and of what it holds, in the present pose."""
         rotations = self._data.geom_xmat[self._geoms].reshape(-1, 3, 3)
         middles_m = self._data.geom_xpos[self._geoms] + np.einsum("gij,gj->gi", rotations, self._middles_m)
-        tool = self._data.site_xmat[self._parts.site].reshape(3, 3)
+        tool = self.tool_rotation()
         count = len(self.held)
         return OwnBody(
             np.concatenate([self._kinds, np.full(count, GeomKind.SPHERE)]),
@@ -86,6 +86,11 @@ class PosedRobot:
         """Return the tool's position (3,) in the present pose."""
         position_m: FloatArray = self._data.site_xpos[self._parts.site].copy()
         return position_m
+
+    def tool_rotation(self) -> FloatArray:
+        """Return the tool's rotation (3, 3), tool to world, in the present pose."""
+        rotation: FloatArray = self._data.site_xmat[self._parts.site].reshape(3, 3).copy()
+        return rotation
 
     def require_links(self, links: Iterable[str]) -> None:
         """Raise ConfigurationError for a link that the model lacks."""

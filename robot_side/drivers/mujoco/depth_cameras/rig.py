@@ -81,6 +81,10 @@ class DepthRig:
         self.perception = DepthPerception(self._mapped)
         self._under_way: deque[_Taken] = deque()
 
+    def newest(self) -> dict[str, float]:
+        """Return the figures of the newest picture."""
+        return self.perception.newest(self._robot.tool_m(), self._robot.tool_rotation())
+
     def hold(self, held: FloatArray | None) -> None:
         """Take what the gripper holds from now on: (k, 4) spheres in the tool's frame; None if it holds nothing."""
         self._robot.held = np.empty((0, 4)) if held is None else held

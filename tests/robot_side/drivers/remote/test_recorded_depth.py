@@ -41,5 +41,5 @@ def test_a_recorded_picture_arrives_from_where_its_camera_stood(tmp_path: Path) 
     assert found.picture.pinhole.fy == 51.0
     assert found.mount is not None
     assert found.mount.position_m == (1.0, 2.0, 3.0)
-    np.testing.assert_allclose(found.mount.rotation(), quarter, atol=1e-12)
+    assert found.mount.quaternion == pytest.approx((np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5)))
     assert notes == []

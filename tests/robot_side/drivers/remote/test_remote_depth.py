@@ -87,7 +87,7 @@ def test_labels_roles_and_a_mount_arrive_as_they_were_sent() -> None:
     assert taken.mount is not None
     assert (taken.mount.link, taken.mount.position_m) == ("hand", (0.0, -0.05, 0.02))
     # A half turn about the optical axis.
-    assert taken.mount.rotation() == pytest.approx(np.diag([-1.0, -1.0, 1.0]))
+    assert taken.mount.quaternion == (0.0, 0.0, 0.0, 1.0)
 
 
 def test_an_echo_bounds_the_age_from_both_sides() -> None:
