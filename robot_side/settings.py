@@ -186,6 +186,8 @@ class RobotSettings(PaperFlags, SideOptions):
         if self.pictures is not None and not self.cameras.on:
             raise ValueError("--pictures and --no-cameras exclude each other; valid: one of them")
         require_law(self.law)
+        if self.depth_map.unseen == "half" and self.law != "swept":
+            raise ValueError(f"--depth-map.unseen half and --law {self.law} exclude each other; valid: --law swept")
         if self.perception is not None:
             require_name("perception", self.perception, (BY_DEPTH,))
         sources = [f"--{name}" for name in ("perception", "objects", "depth") if getattr(self, name) is not None]

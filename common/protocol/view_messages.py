@@ -192,6 +192,8 @@ class SceneState(Message, frozen=True, tag="scene"):
     those of an earlier message; None: they stay. Sent once a second, or less often over a slow link"""
     surface_roles: bytes = b""
     """(s,) uint8: roles of the surfaces, as in `roles`"""
+    unseen: tuple[float, float, float, float, float] | None = None
+    """Share, 0 to 1, of the space ahead, left, right, above and below the gripper that no depth camera has seen"""
 
     def __post_init__(self) -> None:
         if len(self.surfaces or b"") != _SURFACE_BYTES * len(self.surface_roles):

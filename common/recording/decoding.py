@@ -12,8 +12,8 @@ from common.errors import RemoteProtocolError
 from common.protocol.codec import decode, decode_view
 from common.protocol.messages import MotionCommand, StiffnessUpdate, Telemetry
 from common.protocol.view_messages import AnyViewMessage, SceneState
-from common.recording.entries import Block, Entry, Kind, split_text
-from common.recording.topics import by_name
+from common.recording.entries import FRAME, HAS_UNKNOWN, SHARES, Block, Entry, Kind, split_text
+from common.recording.topics import Unseen, by_name
 from common.recording.wire import as_json
 
 AGES_PERIOD_S: Final = 0.01
@@ -43,6 +43,7 @@ class Decoder:
         self._ages_s = -math.inf
         self._field_sent_s = self._frame_s = math.nan
         self._field_number = 0
+        self._unseen: tuple[float, ...] = ()
 
     def shown(self, block: Block) -> Iterator[Shown]:
         """Yield the messages decoded from a block's entries; entries that cannot be decoded are passed over."""
@@ -59,7 +60,10 @@ class Decoder:
         elif entry.kind == Kind.EPISODE and (self.alone or self._side == "operator"):
             yield _shown("/episode", entry.now_s, {"time_s": entry.now_s, "side": self._side}, _mark(entry))
         elif entry.kind == Kind.FRAME:
-            self._frame_s = struct.unpack_from("<d", entry.content)[0]
+            self._frame_s, flags = FRAME.unpack_from(entry.content)
+            if flags & HAS_UNKNOWN and (shares := SHARES.unpack_from(entry.content, FRAME.size)) != self._unseen:
+                self._unseen = shares
+                yield Shown("/unseen", entry.now_s, as_json(Unseen(entry.now_s, *shares)))
         elif entry.kind in (Kind.TICK, Kind.MOTION) and entry.now_s >= self._ages_s + AGES_PERIOD_S - 1e-6:
             self._ages_s = entry.now_s
             applied_s = struct.unpack_from("<d", entry.content)[0] if entry.kind == Kind.TICK else math.nan

@@ -18,6 +18,12 @@ from typing import Final, NamedTuple
 
 _BLOCK: Final = struct.Struct("<IIdd")
 _ENTRY: Final = struct.Struct("<BId")
+FRAME: Final = struct.Struct("<dB")
+"""Beginning of a FRAME: its time, and flags"""
+HAS_UNKNOWN: Final = 16
+"""Flag of frames in which SHARES come next"""
+SHARES: Final = struct.Struct("<5d")
+"""Shares of the space ahead, left, right, above and below the gripper that nobody has seen"""
 
 
 class Kind(IntEnum):

@@ -99,6 +99,16 @@ class Overlaps(ViewStamps, frozen=True):
     objects: list[ObjectOverlap]
 
 
+class Unseen(Moment, frozen=True):
+    """Share, 0 to 1, of the space on each side of the gripper that no depth camera has seen."""
+
+    ahead: float
+    left: float
+    right: float
+    up: float
+    down: float
+
+
 def by_name(value: Any) -> Any:
     """Return a struct as a dict without its header, nested ones as dicts, too; any other value as it is."""
     if not isinstance(value, msgspec.Struct):
@@ -139,6 +149,7 @@ TYPES: Final[Mapping[str, type[msgspec.Struct]]] = {
     "/telemetry": _named(Telemetry, ViewStamps),
     "/enlargement": _named(Terms, ViewStamps),
     "/overlap": Overlaps,
+    "/unseen": Unseen,
     "/robot/status": _named(RobotStatus, Moment),
     "/operator/status": _named(OperatorStatus, Moment),
 }

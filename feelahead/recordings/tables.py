@@ -33,13 +33,13 @@ _ROWS_A_MESSAGE: Final = 100
 _STAMPS: Final = ("time_s", "now_s", "sent_s", "sequence", "side")
 """Columns that the joined table leaves out."""
 _TOPICS: Final = (
-    *("/stiffness", "/command", "/ages", "/telemetry", "/enlargement", "/overlap"),
+    *("/stiffness", "/command", "/ages", "/telemetry", "/enlargement", "/overlap", "/unseen"),
     *("/robot/status", "/operator/status", "/operator/facts", "/episode"),
     *("/robot/inputs", "/operator/inputs"),
 )
 _JOINED: Final = (
     *("stiffness", "command", "felt", "controller", "arm"),
-    *("telemetry", "ages", "enlargement", "overlap", "robot_status"),
+    *("telemetry", "ages", "enlargement", "overlap", "unseen", "robot_status"),
 )
 
 

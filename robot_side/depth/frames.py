@@ -8,6 +8,7 @@ from common.arrays import FloatArray
 from robot_side.depth.slots import SlotChanges, Slots
 from robot_side.surroundings.age import since
 from robot_side.surroundings.perceived import PerceivedObjects
+from robot_side.surroundings.unknown_space import UnknownSpace
 
 
 class SurfaceFrames:
@@ -24,18 +25,20 @@ class SurfaceFrames:
         self._taken_s = (math.inf, math.inf)
         self._frame = self._slots.first
         self._unseen_m = 0.0
+        self._unknown: UnknownSpace | None = None
 
-    def take(self, changes: SlotChanges, taken_s: tuple[float, float]) -> None:
-        """Take surfaces that have changed. taken_s: earliest and latest time of the newest picture."""
+    def take(self, changes: SlotChanges, taken_s: tuple[float, float], unknown: UnknownSpace | None = None) -> None:
+        """Take surfaces that have changed, and unseen space. taken_s: earliest and latest time of the newest picture.
+        """
         self._slots.apply(changes)
-        self._taken_s, self._unseen_m = taken_s, math.nan
+        self._taken_s, self._unseen_m, self._unknown = taken_s, math.nan, unknown
 
     def at(self, now_s: float) -> PerceivedObjects:
         """Return the frame at `now_s`: the same object until something in it has changed."""
         unseen_m = since(self._taken_s, now_s, self._unseen_m_s).unseen_m
         if unseen_m != self._unseen_m:
             self._unseen_m = unseen_m
-            self._frame = self._slots.frame(self._taken_s[0], self._sds_m(), unseen_m)
+            self._frame = self._slots.frame(self._taken_s[0], self._sds_m(), unseen_m, self._unknown)
         return self._frame
 
     def _sds_m(self) -> FloatArray:

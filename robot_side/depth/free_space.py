@@ -1,30 +1,20 @@
-"""Space that has been seen, in coarse cells, and the share around the gripper that nobody has seen."""
+"""Space that has been seen, in coarse cells, and what around the gripper nobody has seen."""
 
-from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
-from common.arrays import FloatArray, IntArray
+from common.arrays import BoolArray, FloatArray, IntArray
 from robot_side.compiled.kernel import array_of, compiled, input_array, input_indices
-from robot_side.depth.picture import DepthArray
+from robot_side.depth.own_body import within
+from robot_side.depth.picture import DepthArray, OwnBody
 from robot_side.depth.settings import MapSettings
 from robot_side.depth.view import LEAST, PICTURE, pixel_of, to_camera
+from robot_side.surroundings.unknown_space import UnknownSpace
 
 _CELL_M: Final = 0.04
 _STEEP: Final = 0.99
 """Upward part of the direction ahead from which up says nothing"""
-
-
-@dataclass(frozen=True)
-class Unknown:
-    """Share of the space beside the gripper that has never been seen, by direction: 0 to 1."""
-
-    ahead: float
-    left: float
-    right: float
-    up: float
-    down: float
 
 
 class SeenSpace:
@@ -40,7 +30,7 @@ class SeenSpace:
         """Note what a picture shows: all space up to what it measures."""
         _mark_seen(depth_m, view, self._place, self._cells, self._seen)
 
-    def unknown(self, position_m: FloatArray, rotation: FloatArray, half_m: float, reach_m: float) -> Unknown:
+    def unknown(self, position_m: FloatArray, rotation: FloatArray, half_m: float, reach_m: float) -> UnknownSpace:
         """Return which share of the space around the gripper nobody has seen; all beyond the region counts as such.
 
         rotation (3, 3): of the gripper, which advances along its z. Each direction has a box that begins half_m from
@@ -58,7 +48,7 @@ class SeenSpace:
         def share(main: FloatArray, side: FloatArray, other: FloatArray) -> float:
             return 1.0 - float(self._has_seen(position_m + steps @ np.stack([main, side, other])).mean())
 
-        return Unknown(
+        return UnknownSpace(
             ahead=share(ahead, left, up),
             left=share(left, ahead, up),
             right=share(-left, ahead, up),
@@ -66,12 +56,47 @@ class SeenSpace:
             down=share(-up, ahead, left),
         )
 
+    def boxes_m(self, position_m: FloatArray, reach_m: float, surfaces_m: FloatArray, body: OwnBody) -> FloatArray:
+        """Return boxes of the cells (u, 2, 3), lower and upper corners, near a point that nobody has seen.
+
+        Cells beyond the region count as such. Those with points of surfaces (n, 3) are left out, as the surface is
+        felt there; so are those about the `body`.
+        """
+        first = np.floor((position_m - reach_m - self._place[:3]) / _CELL_M)
+        count = round(2.0 * reach_m / _CELL_M) + 1
+        cells = np.indices((count,) * 3).reshape(3, -1).T
+        middles_m: FloatArray = self._place[:3] + (first + cells + 0.5) * _CELL_M
+        unseen = (self._has_seen(middles_m) == 0.0) & (within(middles_m, body, _CELL_M) == 0)
+        unseen = unseen.reshape((count,) * 3)
+        on = np.floor((surfaces_m - self._place[:3]) / _CELL_M).astype(np.int64) - first.astype(np.int64)
+        unseen[tuple(on[((on >= 0) & (on < count)).all(axis=1)].T)] = False
+        return self._place[:3] + (first + _in_boxes(unseen)) * _CELL_M
+
     def _has_seen(self, points_m: FloatArray) -> FloatArray:
         cells = np.floor((points_m - self._place[:3]) / _CELL_M).astype(np.int64)
         inside = ((cells >= 0) & (cells < self._cells)).all(axis=1)
         found = np.zeros(len(points_m))
         found[inside] = self._seen[np.ravel_multi_index(tuple(cells[inside].T), tuple(self._cells))]
         return found
+
+
+def _in_boxes(cells: BoolArray) -> IntArray:
+    """Return boxes (u, 2, 3), first indices and those behind the last, which together are the cells (a, b, c)."""
+    left, boxes = cells.copy(), []
+    for low in np.argwhere(cells):
+        if not left[tuple(low)]:
+            continue
+        high = low + 1
+        for axis in (2, 1, 0):
+            while high[axis] < cells.shape[axis]:
+                layer = [slice(*ends) for ends in zip(low, high, strict=True)]
+                layer[axis] = slice(high[axis], high[axis] + 1)
+                if not left[tuple(layer)].all():
+                    break
+                high[axis] += 1
+        left[tuple(slice(*ends) for ends in zip(low, high, strict=True))] = False
+        boxes.append((low, high))
+    return np.array(boxes, dtype=np.int64).reshape(-1, 2, 3)
 
 
 @compiled(PICTURE, input_array(1), input_array(1), input_indices(), array_of(np.uint8, 1))

@@ -36,6 +36,45 @@ def own_pixels(depth_m: DepthArray, view: FloatArray, body: OwnBody, padding_m: 
     return grown
 
 
+def within(points_m: FloatArray, body: OwnBody, padding_m: float) -> LabelArray:
+    """Return (n,) 1 for the points (n, 3) that are within `padding_m` of the body."""
+    found = np.zeros(len(points_m), dtype=np.uint8)
+    solids = (body.kinds, *map(np.ascontiguousarray, (body.positions_m, body.rotations, body.sizes_m)))
+    _find_within(np.ascontiguousarray(points_m), *solids, padding_m, found)
+    return found
+
+
+@compiled(
+    *(input_array(2), input_indices(), input_array(2), input_array(3), input_array(2), FLOAT64),
+    array_of(np.uint8, 1),
+)
+def _find_within(
+    points_m: FloatArray,
+    kinds: IntArray,
+    positions_m: FloatArray,
+    rotations: FloatArray,
+    sizes_m: FloatArray,
+    padding_m: float,
+    found: LabelArray,
+) -> None:
+    for n in range(found.size):
+        for k in range(kinds.size):
+            away = subtract(load(points_m, n), load(positions_m, k))
+            if _beyond(kinds[k], load(sizes_m, k), _turned(rotations, k, away)) <= padding_m:
+                found[n] = 1
+
+
+@building_block
+def _turned(rotations: FloatArray, k: int, a: Vector) -> Vector:
+    """Return a vector of the world in the frame of solid k."""
+    u, v, w = a
+    return (
+        rotations[k, 0, 0] * u + rotations[k, 1, 0] * v + rotations[k, 2, 0] * w,
+        rotations[k, 0, 1] * u + rotations[k, 1, 1] * v + rotations[k, 2, 1] * w,
+        rotations[k, 0, 2] * u + rotations[k, 1, 2] * v + rotations[k, 2, 2] * w,
+    )
+
+
 @building_block
 def _beyond(kind: int, size: Vector, point: Vector) -> float:
     """Return the distance of a point from a solid in the solid's own frame; of ellipsoids at most as much."""
@@ -108,12 +147,7 @@ def _mark(
                 u, v, w = subtract(to_world(view, (across * depth, down * depth, 1.0 * depth)), center)
                 if u * u + v * v + w * w > reach * reach:
                     continue
-                point = (
-                    rotations[k, 0, 0] * u + rotations[k, 1, 0] * v + rotations[k, 2, 0] * w,
-                    rotations[k, 0, 1] * u + rotations[k, 1, 1] * v + rotations[k, 2, 1] * w,
-                    rotations[k, 0, 2] * u + rotations[k, 1, 2] * v + rotations[k, 2, 2] * w,
-                )
-                if _beyond(kinds[k], size, point) <= padding_m:
+                if _beyond(kinds[k], size, _turned(rotations, k, (u, v, w))) <= padding_m:
                     own[i, j] = 1
 
 

@@ -1,6 +1,6 @@
 """From pictures to surfaces that are handed on: the map, and a fixed pool of objects that shows it."""
 
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import Final
 
 from common.arrays import FloatArray
@@ -9,9 +9,12 @@ from robot_side.depth.depth_map import DepthMap, Integrated
 from robot_side.depth.picture import CameraPose, DepthErrors, DepthPicture, OwnBody
 from robot_side.depth.settings import MapSettings
 from robot_side.depth.slots import EXACT, TARGET_NAME, SlotChanges, Slots
+from robot_side.surroundings.unknown_space import UnknownSpace
 
 _AROUND_M: Final = (0.06, 0.25)
 """Half width of the gripper's section, and reach, within which unseen space is told"""
+_FELT_M: Final = 0.3
+"""Reach within which unseen space may be felt"""
 
 
 class DepthPerception:
@@ -21,12 +24,12 @@ class DepthPerception:
         self._errors = EXACT
         self.last: Integrated | None = None
         """What the newest picture did; None before the first"""
-        self._map = DepthMap(settings)
+        self._map, self._unseen_is_felt = DepthMap(settings), settings.unseen == "half"
         self._slots = Slots(settings.slots)
 
     def see(self, picture: DepthPicture, pose: CameraPose, body: OwnBody, errors: DepthErrors, camera: int) -> None:
         """Add a picture of `camera` to the map. pose, body: as they were when it was taken."""
-        self._errors = errors
+        self._errors, self._body = errors, body
         self.last = self._map.integrate(picture, pose, body, errors, camera)
 
     def changes(self, near_m: FloatArray, *, holds: bool = False) -> SlotChanges:
@@ -47,13 +50,18 @@ class DepthPerception:
         elif (box := self._slots.box_of(name)) is not None:
             self._map.mark(box, role)
 
-    def newest(self, tool_m: FloatArray, rotation: FloatArray) -> dict[str, float]:
-        """Return what the newest picture did, and the shares of the space around the tool that nobody has seen.
+    def newest(self) -> dict[str, float]:
+        """Return what the newest picture did; nothing before the first."""
+        return {} if self.last is None else {name: float(value) for name, value in asdict(self.last).items()}
+
+    def unknown(self, tool_m: FloatArray, rotation: FloatArray) -> UnknownSpace:
+        """Return the space around the tool that nobody has seen.
 
         tool_m (3,), rotation (3, 3): pose of the tool, which advances along its z.
         """
-        if self.last is None:
-            return {}
-        unknown = asdict(self._map.seen.unknown(tool_m, rotation, *_AROUND_M))
-        did = {name: float(value) for name, value in asdict(self.last).items()}
-        return did | {f"unknown_{direction}": share for direction, share in unknown.items()}
+        found = self._map.seen.unknown(tool_m, rotation, *_AROUND_M)
+        if not self._unseen_is_felt or self.last is None:
+            return found
+        surfels = self._map.surfels
+        points_m = surfels.table.points_m[surfels.shown]
+        return replace(found, boxes_m=self._map.seen.boxes_m(tool_m, _FELT_M, points_m, self._body))

@@ -2,8 +2,9 @@
 
 import math
 from dataclasses import dataclass
-from typing import Annotated, Final
+from typing import Annotated, Final, Literal
 
+import tyro
 from msgspec import Meta
 
 from common.limits import Limited
@@ -26,6 +27,8 @@ class MapSettings(Limited):
     """Distance from the robot's own solids within which a measured point is the robot's own"""
     slots: Annotated[int, Meta(ge=64, le=16384)] = 2048
     """Largest number of surfaces that are handed on"""
+    unseen: Annotated[Literal["free", "half"], tyro.conf.arg(metavar="{free,half}")] = "free"
+    """Space that no camera has seen: free, or felt with at most half strength. half needs --law swept."""
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -20,6 +20,7 @@ from robot_side.surroundings.fixed_objects import joined
 from robot_side.surroundings.kinds.layout import NUMBERS
 from robot_side.surroundings.movers import Movers
 from robot_side.surroundings.perceived import PerceivedObjects
+from robot_side.surroundings.unknown_space import UnknownSpace
 
 _PARKED_M: Final = -1000.0
 """Height of unused slots"""
@@ -181,15 +182,16 @@ class Slots:
         self._frame_numbers = self._frame_numbers.copy()
         self._write(slots)
 
-    def frame(self, time_s: float, of_slots_m: FloatArray, unseen_m: float = 0.0) -> PerceivedObjects:
-        """Return the frame of all changes so far. of_slots_m (n,): σ_c of each slot. unseen_m: as in a frame."""
+    def frame(
+        self, time_s: float, of_slots_m: FloatArray, unseen_m: float = 0.0, unknown: UnknownSpace | None = None
+    ) -> PerceivedObjects:
+        """Return the frame of all changes so far. of_slots_m (n,): σ_c of each slot. Others: as in a frame."""
         fixed = len(self._fixed_roles)
         sds_m = np.concatenate([[of_slots_m[:PIECES].max()], of_slots_m[PIECES:], np.zeros(fixed)])
         # The target is an object by itself.
         surfaces = np.concatenate([[-1], self._planes[PIECES:], np.full(fixed, -1)])
-        return self._movers.frame(
-            time_s, self._frame_numbers, self._frame_roles + self._fixed_roles, unseen_m, sds_m=sds_m, surfaces=surfaces
-        )
+        roles = self._frame_roles + self._fixed_roles
+        return self._movers.frame(time_s, self._frame_numbers, roles, unseen_m, 0.0, sds_m, surfaces, unknown)
 
     def _write(self, slots: IntArray) -> None:
         self._frame_numbers[slots, :BOX_NUMBERS] = self._numbers[slots]

@@ -15,6 +15,7 @@ from robot_side.laws.gripper_motion import GripperMotion
 from robot_side.laws.path import Drift, Waypoint, times_ahead_s, waypoints
 from robot_side.laws.prospect import Assumed, Prospect, prospect, stopping_s
 from robot_side.laws.recent_looks import Newest, RecentLooks
+from robot_side.laws.unknown import UnknownAhead
 from robot_side.laws.vicinity import farthest_m, nothing_within
 from robot_side.surroundings.scene_table import SceneTable
 from robot_side.tick.sensed import L2, R2, STICK
@@ -66,9 +67,13 @@ class Looking:
     """Gripper spheres times primitives, over all looks"""
     at_full_rate: int = 0
     """Number of looks if each tick made all of them; see `pass_tick`"""
+    unknown: UnknownAhead = field(init=False)
     _done: int = 0
     _clear: bool | None = None
     """Whether nothing is near in the newest tick that looked (see `vicinity`); None if no look depended on it"""
+
+    def __post_init__(self) -> None:
+        self.unknown = UnknownAhead(self.ahead.encoder_sigma_rad)
 
     def look(self, seen: Seen, *, changed: bool) -> None:
         """Make the looks of one tick. changed: whether the situation has changed, or objects have moved."""
@@ -98,9 +103,11 @@ class Looking:
 
     def _nothing_near(self, seen: Seen) -> bool:
         if self._clear is None:
+            unknown = seen.situation.objects.unknown
             reach_m = farthest_m(seen.situation, seen.motion, seen.assumed, self.ahead.encoder_sigma_rad)
             tool_m = seen.situation.pose.tool_position_m
-            self._clear = self.cut is None and nothing_within(seen.scene, seen.classes.usual, tool_m, reach_m)
+            known = self.cut is None and (unknown is None or not len(unknown.boxes_m))
+            self._clear = known and nothing_within(seen.scene, seen.classes.usual, tool_m, reach_m)
         return self._clear
 
     def pass_tick(self, seen: Seen) -> None:
@@ -139,7 +146,8 @@ class Looking:
         self.with_nothing_near += int(made.counts[Count.PAIRS] == 0)
         direction = found.asked.along.direction
         began_m = float(direction @ seen.situation.pose.tool_position_m)
-        return made, direction, began_m, found.from_tool_m(made.onsets_m)
+        both_m = self.unknown.with_unknown_m(made.onsets_m, found.asked, seen.situation.objects.unknown)
+        return made, direction, began_m, found.from_tool_m(both_m)
 
     def _look_from_here(self, side: int, seen: Seen) -> None:
         found = seen.prospect(side)

@@ -129,7 +129,8 @@ def _serve(channel: Channel, taking: Taking, wait: Callable[[float], object], wa
         if news is not None:
             # What has not been sent is lost, and all is sent instead.
             changes = news.changes if all_sent else taking.perception.whole()
-            all_sent = channel.send(encode(surfaces(changes, news.taken_s, taking.newest())))
+            told = taking.perception.newest(), taking.unknown()
+            all_sent = channel.send(encode(surfaces(changes, news.taken_s, *told)))
         wait(_WAIT_S)
 
 

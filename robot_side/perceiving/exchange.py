@@ -14,6 +14,7 @@ from common.sockets.door.messages import DoorSettings
 from robot_side.depth.camera_settings import DepthCameraSettings, LinkMount
 from robot_side.depth.settings import MapSettings
 from robot_side.depth.slots import BOX_NUMBERS, SlotChanges
+from robot_side.surroundings.unknown_space import UnknownSpace
 
 
 class Loaded(msgspec.Struct, frozen=True):
@@ -87,9 +88,14 @@ class Surfaces(msgspec.Struct, frozen=True, tag=True):
     crowded_out: int
     seen: dict[str, float]
     """Figures of the pictures since the last message, and of the map"""
+    unknown: tuple[float, float, float, float, float]
+    unknown_boxes: bytes
+    """(u, 2, 3) float64; both as in `UnknownSpace`"""
 
 
-def surfaces(changes: SlotChanges, taken_s: tuple[float, float], seen: dict[str, float]) -> Surfaces:
+def surfaces(
+    changes: SlotChanges, taken_s: tuple[float, float], seen: dict[str, float], unknown: UnknownSpace
+) -> Surfaces:
     """Return the message of these changes; arguments as the message's fields."""
     return Surfaces(
         taken_s=taken_s,
@@ -100,6 +106,8 @@ def surfaces(changes: SlotChanges, taken_s: tuple[float, float], seen: dict[str,
         planes=changes.planes.tobytes(),
         crowded_out=changes.crowded_out,
         seen=seen,
+        unknown=unknown.shares,
+        unknown_boxes=unknown.boxes_m.tobytes(),
     )
 
 
@@ -113,6 +121,11 @@ def changes_of(message: Surfaces) -> SlotChanges:
         np.frombuffer(message.planes, dtype=np.int64),
         message.crowded_out,
     )
+
+
+def unknown_of(message: Surfaces) -> UnknownSpace:
+    """Return the unknown space of a message."""
+    return UnknownSpace(*message.unknown, np.frombuffer(message.unknown_boxes).reshape(-1, 2, 3))
 
 
 class Note(msgspec.Struct, frozen=True, tag=True):

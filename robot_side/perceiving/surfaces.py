@@ -28,6 +28,7 @@ from robot_side.perceiving.exchange import (
     changes_of,
     decode_from_companion,
     encode,
+    unknown_of,
 )
 from robot_side.surroundings.perceived import PerceivedObjects
 from robot_side.tick.events import Listener, Tick
@@ -180,7 +181,7 @@ class Surfaced(Listener):
             self._growing, self._is_new = (self._new_frames(), now_s), False
         shown = self._growing[0] if self._growing is not None else self._frames
         if shown is not None:
-            shown.take(changes, message.taken_s)
+            shown.take(changes, message.taken_s, unknown_of(message))
         self._taken_s, self._pictures = message.taken_s[0], self._pictures + 1
         if not self._said_crowded and (message.crowded_out or message.seen.get("without_room")):
             self._said_crowded = True

@@ -18,6 +18,7 @@ from robot_side.drivers.mujoco.depth_cameras.rig import DepthRig
 from robot_side.drivers.mujoco.scene import Scene
 from robot_side.drivers.remote.depth import RemoteDepth, TakenDepth
 from robot_side.perceiving.exchange import Joints
+from robot_side.surroundings.unknown_space import UnknownSpace
 
 _REMEMBERED_S: Final = 3.0
 """Time for which the robot's motion is remembered"""
@@ -41,8 +42,8 @@ class Taking(Protocol):
         """Map of the pictures"""
         ...
 
-    def newest(self) -> dict[str, float]:
-        """Return the figures of the newest picture."""
+    def unknown(self) -> UnknownSpace:
+        """Return the space around the tool that nobody has seen."""
         ...
 
     def hear(self, joints: Joints) -> None:
@@ -76,9 +77,9 @@ class SimulatedPictures:
         """Map of the pictures"""
         return self._rig.perception
 
-    def newest(self) -> dict[str, float]:
-        """Return the figures of the newest picture."""
-        return self._rig.newest()
+    def unknown(self) -> UnknownSpace:
+        """Return the space around the tool that nobody has seen."""
+        return self._rig.unknown()
 
     def hear(self, joints: Joints) -> None:
         """Take where everything was."""
@@ -129,9 +130,9 @@ class SentPictures:
         while self._motion[0][0] < joints.time_s - _REMEMBERED_S:
             self._motion.popleft()
 
-    def newest(self) -> dict[str, float]:
-        """Return the figures of the newest picture."""
-        return self.perception.newest(self._robot.tool_m(), self._robot.tool_rotation())
+    def unknown(self) -> UnknownSpace:
+        """Return the space around the tool that nobody has seen."""
+        return self.perception.unknown(self._robot.tool_m(), self._robot.tool_rotation())
 
     def set_role(self, name: str, role: Role) -> None:
         """Change the role of a surface."""

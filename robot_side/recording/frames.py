@@ -1,12 +1,13 @@
 """Encoding and decoding of recorded frames of perceived objects.
 
-    frame   time f64, flags u8 (1: whole, 2: errors, 4: meshes, 8: surfaces), then for each array of ARRAYS: tag u8,
-            rows u32, and by the tag
+    frame   time f64, flags u8 (1: whole, 2: errors, 4: meshes, 8: surfaces, 16: unknown space); if flagged, five f64,
+            the shares of unknown space (`common.recording.entries`); then for each array of ARRAYS: tag u8, rows u32,
+            and by the tag
               0   nothing: same as in the frame before   1   rows x width values
               2   count u32, count row numbers u32, count x width values: these rows, the others as before
               3   nothing: the array is None
             errors, if flagged: sds_m as such an array, unseen_m f64, late_s f64
-            surfaces, if flagged, as such an array
+            surfaces, if flagged, as such an array; boxes of unknown space, if flagged, too
             meshes, if flagged: length u32 and MessagePack: vertices and triangles of each mesh that was sent
             names: length u32 and MessagePack, in whole frames only; roles: one u8 an object
 
@@ -21,8 +22,10 @@ from typing import Any, Final
 import msgspec
 import numpy as np
 
+from common.recording.entries import FRAME, HAS_UNKNOWN, SHARES
 from common.roles import Role
 from robot_side.surroundings.perceived import KINDS, PerceivedObjects, library_of
+from robot_side.surroundings.unknown_space import UnknownSpace
 
 ARRAYS: Final[Mapping[str, tuple[type, tuple[int, ...]]]] = {
     name: described
@@ -35,7 +38,6 @@ ARRAYS: Final[Mapping[str, tuple[type, tuple[int, ...]]]] = {
 """Arrays of a frame in their order, with the type of their values and the shape of a row"""
 _SAME, _WHOLE, _ROWS, _NONE = range(4)
 _IS_WHOLE, _HAS_ERRORS, _HAS_MESHES, _HAS_SURFACES = 1, 2, 4, 8
-_FRAME: Final = struct.Struct("<dB")
 _UNSEEN: Final = struct.Struct("<dd")
 _LENGTH: Final = struct.Struct("<I")
 _ARRAY: Final = struct.Struct("<BI")
@@ -63,7 +65,10 @@ class FramePacker:
         errs = frame.sds_m is not None or frame.unseen_m > 0.0 or frame.late_s > 0.0
         flags = (last is None) * _IS_WHOLE | errs * _HAS_ERRORS | bool(sources) * _HAS_MESHES
         flags |= (frame.surfaces is not None) * _HAS_SURFACES
-        parts = [_FRAME.pack(frame.time_s, flags)]
+        flags |= (frame.unknown is not None) * HAS_UNKNOWN
+        parts = [FRAME.pack(frame.time_s, flags)]
+        if frame.unknown is not None:
+            parts.append(SHARES.pack(*frame.unknown.shares))
         for name in ARRAYS:
             parts += _packed(getattr(frame, name), None if last is None else getattr(last, name))
         if errs:
@@ -71,6 +76,9 @@ class FramePacker:
             parts.append(_UNSEEN.pack(frame.unseen_m, frame.late_s))
         if frame.surfaces is not None:
             parts += _packed(frame.surfaces, None if last is None else last.surfaces)
+        if frame.unknown is not None:
+            before = None if last is None or last.unknown is None else last.unknown.boxes_m
+            parts += _packed(frame.unknown.boxes_m, before)
         for content in ([sources] if sources else []) + ([frame.names] if last is None else []):
             packed = msgspec.msgpack.encode(content)
             parts += [_LENGTH.pack(len(packed)), packed]
@@ -109,11 +117,13 @@ class FrameUnpacker:
 
     def unpack(self, content: bytes) -> PerceivedObjects:
         """Decode a frame; ValueError or struct.error for invalid content, or for changes without the frame before."""
-        time_s, flags = _FRAME.unpack_from(content)
+        time_s, flags = FRAME.unpack_from(content)
         whole = flags & _IS_WHOLE
         if not whole and self._last is None:
             raise ValueError("the frame holds only changes, but no complete frame came before it")
-        last, position = None if whole else self._last, _FRAME.size
+        last, position = None if whole else self._last, FRAME.size
+        shares = SHARES.unpack_from(content, position) if flags & HAS_UNKNOWN else None
+        position += 0 if shares is None else SHARES.size
         arrays: dict[str, Any] = {}
         for name, (kind, shape) in ARRAYS.items():
             arrays[name], position = _unpacked(
@@ -128,6 +138,11 @@ class FrameUnpacker:
             arrays["surfaces"], position = _unpacked(
                 content, position, np.int64, (), None if last is None else last.surfaces
             )
+        if shares is not None:
+            before = None if last is None or last.unknown is None else last.unknown.boxes_m
+            boxes_m, position = _unpacked(content, position, np.float64, (2, 3), before)
+            ahead, left, right, up, down = shares
+            arrays["unknown"] = UnknownSpace(ahead, left, right, up, down, boxes_m)
         library = None if last is None else last.mesh_library
         if flags & _HAS_MESHES:
             sources, position = _content(content, position, tuple[tuple[bytes, bytes], ...])

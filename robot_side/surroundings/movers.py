@@ -17,6 +17,7 @@ from common.roles import Role
 from robot_side.surroundings.kinds.layout import NUMBERS, rows
 from robot_side.surroundings.perceived import KINDS, PerceivedObjects
 from robot_side.surroundings.placing import numbers_of, primitives_of
+from robot_side.surroundings.unknown_space import UnknownSpace
 
 OF_OBJECTS: Final = {"positions_m": (3,), "rotations": (3, 3), "velocities_m_s": (3,)}
 """Arrays of a frame that have a row for each object, and the shape of a row, in the order of an object's numbers"""
@@ -65,7 +66,7 @@ class Movers:
         """(n,) indices of the movers' primitives among all primitives of the frame"""
         self.first_rows = np.searchsorted(owners[self._own], np.append(things, len(first.names)))
         self.parts = self._all_parts(kinds[self._own], rows_of_kind[self._own])
-        made_whole = {*self.parts, "time_s", "roles", "since", "unseen_m", "late_s", "sds_m", "surfaces"}
+        made_whole = {*self.parts, "time_s", "roles", "since", "unseen_m", "late_s", "sds_m", "surfaces", "unknown"}
         self._still = {name: value for name, value in vars(first).items() if name not in made_whole}
 
     def _all_parts(self, kinds: IntArray, rows_of_kind: IntArray) -> Mapping[str, Part]:
@@ -118,11 +119,12 @@ class Movers:
         late_s: float = 0.0,
         sds_m: FloatArray | None = None,
         surfaces: IntArray | None = None,
+        unknown: UnknownSpace | None = None,
     ) -> PerceivedObjects:
         """Return a new frame: the movers have these numbers (n + m, 20), all other objects are as in the first frame.
 
-        roles: of all objects. unseen_m, late_s: as in a frame. sds_m, surfaces: of all objects; None: as in the first
-        frame.
+        roles: of all objects. unseen_m, late_s, unknown: as in a frame. sds_m, surfaces: of all objects; None: as in
+        the first frame.
         ValueError for numbers of another shape or type, or for another number of roles or of surfaces.
         """
         shape = len(self._own) + len(self.things), NUMBERS
@@ -133,7 +135,7 @@ class Movers:
             )
         if len(roles) != len(self.first.names):
             raise ValueError(f"roles holds {len(roles)} roles; valid: one for each of {len(self.first.names)} objects")
-        said = {"time_s": time_s, "roles": roles, "unseen_m": unseen_m, "late_s": late_s}
+        said = {"time_s": time_s, "roles": roles, "unseen_m": unseen_m, "late_s": late_s, "unknown": unknown}
         said["sds_m"] = self.first.sds_m if sds_m is None else sds_m
         said["surfaces"] = self.first.surfaces if surfaces is None else surfaces
         return _MoversFrame(**self._still, **said, since=(self, numbers))

@@ -9,6 +9,7 @@ import numpy as np
 from common.arrays import FloatArray, IntArray
 from common.roles import Role
 from robot_side.surroundings.kinds import box, ellipsoid, half_space, mesh, sphere, tetrahedron
+from robot_side.surroundings.unknown_space import UnknownSpace
 
 if TYPE_CHECKING:
     # A scene without meshes does not load the kernels for them.
@@ -83,6 +84,8 @@ class PerceivedObjects:
     """Distance by which each object may have moved since it was seen, in any direction"""
     late_s: float = 0.0
     """Time by which moving objects may be ahead of or behind their positions, as the frame's age is not known well"""
+    unknown: UnknownSpace | None = field(default_factory=lambda: None)
+    """Space that nobody has seen; None if nobody says"""
     since: "tuple[SomeObjects, FloatArray] | None" = field(default=None, init=False, repr=False)
     """Movers that made this frame, and their numbers; None if any object may have moved"""
 

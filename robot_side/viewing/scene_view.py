@@ -196,6 +196,7 @@ class SceneView:
             near=self._near(begun.situation),
             surfaces=begun.surfaces[0],
             surface_roles=begun.surfaces[1],
+            unseen=None if objects.unknown is None else objects.unknown.shares,
         )
 
     def _near(self, situation: Situation) -> Near:

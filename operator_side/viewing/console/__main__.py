@@ -246,6 +246,7 @@ class _Process:
             "sigma_mm": (1e3 * state.l2.sigma_m, 1e3 * state.r2.sigma_m),
             "tick_us": (state.tick_p50_us, state.tick_p99_us),
             "near": None if state.near is None else msgspec.structs.asdict(state.near),
+            "unseen": state.unseen,
             **self._cues.of(state),
         }
         self._pages.show(ShownKind.SCENE, msgspec.json.encode(scene).decode())

@@ -92,11 +92,13 @@ def test_an_object_is_found_by_its_name_and_one_without_a_box_is_not() -> None:
     assert slots.box_of("surface 1") is None
 
 
-def test_the_figures_of_a_picture_tell_which_space_around_the_tool_nobody_has_seen() -> None:
+def test_a_perception_tells_which_space_around_the_tool_nobody_has_seen() -> None:
     ahead = looking((0.3, 0.0, 0.3), (0.5, 0.0, 0.1)).rotation
     tool_m = np.array([0.3, -0.05, 0.4])
-    assert DepthPerception(SETTINGS).newest(tool_m, ahead) == {}
-    figures = Pointing().perception.newest(tool_m, ahead)
-    assert figures["boxes"] > 0.0
+    assert DepthPerception(SETTINGS).newest() == {}
+    perception = Pointing().perception
+    assert perception.newest()["boxes"] > 0.0
     # What is ahead lies in the picture, what is behind the camera's back does not.
-    assert figures["unknown_ahead"] < 0.5 < figures["unknown_up"]
+    unknown = perception.unknown(tool_m, ahead)
+    assert unknown.ahead < 0.5 < unknown.up
+    assert not len(unknown.boxes_m)

@@ -30,9 +30,11 @@ from robot_side.perceiving.exchange import (
 from robot_side.perceiving.starting import setup_of
 from robot_side.perceiving.surfaces import OLD_S, Surfaced
 from robot_side.settings import RobotSettings
+from robot_side.surroundings.unknown_space import UnknownSpace
 
 SLOTS = 64
 NEAR = np.zeros(3)
+UNKNOWN = UnknownSpace(0.0, 0.5, 0.25, 0.0, 1.0, np.array([[[0.0, 0.0, 0.0], [0.04, 0.04, 0.08]]]))
 
 
 class FakeCompanion:
@@ -55,7 +57,7 @@ class FakeCompanion:
         assert self.other.send(encode(message))
 
     def show(self, changes: SlotChanges, taken_s: float) -> None:
-        self.say(surfaces(changes, (taken_s, taken_s), {"holes": 3.0}))
+        self.say(surfaces(changes, (taken_s, taken_s), {"holes": 3.0}, UNKNOWN))
 
     def show_four(self, count: int, taken_s: float) -> None:
         """Show a new map of this many boxes, by as many pictures as it needs."""
@@ -148,6 +150,8 @@ def test_nothing_is_perceived_until_the_first_map_has_grown_for_half_a_second(de
         companion.show(slots.update(_boxes(3), NEAR), 0.0)
     frame = desk.look(1.0)
     np.testing.assert_array_equal(frame.box_centers_m[PIECES : PIECES + 3], _boxes(3).centers_m)
+    assert frame.unknown.shares == UNKNOWN.shares
+    np.testing.assert_array_equal(frame.unknown.boxes_m, UNKNOWN.boxes_m)
 
 
 def test_a_frame_stays_the_same_object_until_something_changes_and_its_errors_grow_with_age(desk: Desk) -> None:

@@ -14,6 +14,7 @@ const GAUGES = { l2: -1, r2: 1 }; // side of the gripper's point on which each t
 const RADII = [0.2, 0.5]; // of these arcs in each view, in half heights of the picture
 const ARC_PX = 10; // between an arc and what it stands beside
 const [LABEL_PX, PAD_PX, SIGN_PX] = [20, 12, 11]; // height of a label; most width of its padding, and of a character
+const UNSEEN = { up: 3, left: 1, ahead: 0, right: 2, down: 4 }; // place in the scene's `unseen` of each side, as laid out
 const PLACES = ["nearest", "target", "middle", "height", "ahead", "holding", "rumble", "also"];
 
 const meet = (a, b) => a.x < b.x + b.width && b.x < a.x + a.width && a.y < b.y + b.height && b.y < a.y + a.height;
@@ -158,14 +159,16 @@ class Marks {
 }
 
 export class Overlay {
-  #marks; #slots;
+  #marks; #slots; #unseen;
   #shown = new Map();
 
   // places: the views, the first-person one last. lines: the list below them.
   constructor(places, lines) {
     this.#marks = places.map((place, k) => new Marks(place, RADII[k], k === 0));
     this.#slots = Object.fromEntries(PLACES.map((name) => [name, make("div", { id: `near_${name}` })]));
-    lines.replaceChildren(...Object.values(this.#slots));
+    this.#unseen = make("div", { id: "near_unseen", hidden: true }, make("span", {}, "unseen, %"),
+      ...Object.keys(UNSEEN).map((side) => make("i", { className: side })));
+    lines.replaceChildren(...Object.values(this.#slots), this.#unseen);
   }
 
   // Each figure has its own place, so that none moves when another comes or goes.
@@ -180,10 +183,25 @@ export class Overlay {
     ]));
   }
 
+  // Shares of the space on each side of the gripper that no depth camera has seen; null without such cameras.
+  #showUnseen(shares) {
+    this.#unseen.hidden = !shares;
+    const said = Object.entries(UNSEEN).map(([side, k]) => [side, Math.round(100 * (shares?.[k] ?? 0))]);
+    const words = `Space that no depth camera has seen: ${said.map(([side, part]) => `${side} ${part} %`).join(", ")}`;
+    if (this.#unseen.title === words) return;
+    this.#unseen.title = words;
+    for (const [side, part] of said) {
+      const place = this.#unseen.querySelector(`.${side}`);
+      place.textContent = part;
+      place.style.setProperty("--part", `${part}%`);
+    }
+  }
+
   // fingers: place of each trigger's finger in its zones, 0 to 1; null without one.
   show(scene, facts, fingers) {
     const { near, drop } = scene;
     if (!near || !facts) return;
+    this.#showUnseen(scene.unseen);
     const felt = Object.fromEntries(Object.keys(GAUGES).map((side, k) => [side, strengths(facts[side], fingers[k])]));
     const seen = this.#marks.map((marks, k) => marks.show({
       name: scene.target?.name, box: scene.target?.boxes[k] ?? null, height: drop && `${mm(drop.height_m)} mm`,

@@ -22,6 +22,7 @@ from robot_side.drivers.mujoco.depth_cameras.rendered import DepthCamera
 from robot_side.drivers.mujoco.drawing.off_screen import choose_late
 from robot_side.drivers.mujoco.encoders import Encoder
 from robot_side.drivers.mujoco.scene import Scene
+from robot_side.surroundings.unknown_space import UnknownSpace
 
 _SOON_S: Final = 1e-9
 _LEAST_NOISE: Final = 0.25
@@ -81,9 +82,9 @@ class DepthRig:
         self.perception = DepthPerception(self._mapped)
         self._under_way: deque[_Taken] = deque()
 
-    def newest(self) -> dict[str, float]:
-        """Return the figures of the newest picture."""
-        return self.perception.newest(self._robot.tool_m(), self._robot.tool_rotation())
+    def unknown(self) -> UnknownSpace:
+        """Return the space around the tool that nobody has seen."""
+        return self.perception.unknown(self._robot.tool_m(), self._robot.tool_rotation())
 
     def hold(self, held: FloatArray | None) -> None:
         """Take what the gripper holds from now on: (k, 4) spheres in the tool's frame; None if it holds nothing."""

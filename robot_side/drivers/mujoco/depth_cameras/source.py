@@ -34,7 +34,7 @@ class SimulatedDepth(Listener):
             self._rig.take(self._scene.data, now_s, self._scene.roles)
         if (news := self._rig.arrived(now_s)) is not None:
             changes, taken_s = news
-            self._frames.take(changes, (taken_s, taken_s))
+            self._frames.take(changes, (taken_s, taken_s), self._rig.unknown())
         return self._frames.at(now_s)
 
     def on_tick(self, tick: Tick) -> None:
