@@ -1,21 +1,27 @@
 """Both sides with depth cameras alone: nothing of the scene is modelled for the robot side."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
+from common.recording.reading import open_recording
 from feelahead import Episode
+from feelahead.recordings.replay_robot import replay_robot
+from feelahead.recordings.tables import read_tables
 from robot_side.depth.camera_settings import DepthCameraSettings
+from robot_side.depth.settings import MapSettings
 from robot_side.depth.slots import PIECES
 from tests.helpers.repository import ROOT
 
 WALL = ROOT / "tests" / "data" / "wall.xml"
 
 
-def _seen(eyes: str, model: Path = WALL) -> Episode:
+def _seen(eyes: str, model: Path = WALL, **settings: Any) -> Episode:
     camera = DepthCameraSettings(eyes=eyes, mount_error_m=0.002, rate_hz=15.0)  # type: ignore[arg-type]
-    return Episode(model=model, site="tool", seed=3, link="delay 50ms", perception="depth", depth_camera=camera)
+    given = {"model": model, "site": "tool", "seed": 3, "link": "delay 50ms", "depth_camera": camera, **settings}
+    return Episode(perception="depth", **given)
 
 
 @pytest.mark.parametrize("eyes", ["fixed", "wrist"])
@@ -38,3 +44,19 @@ def test_a_reset_forgets_what_was_seen() -> None:
     fresh = episode.parts.camera.perceive(0.0)
     assert np.count_nonzero(before.box_centers_m[:, 2] > -100.0) > 20
     assert np.count_nonzero(fresh.box_centers_m[:, 2] > -100.0) == 0
+
+
+def test_unseen_space_ahead_is_free_or_has_half_strength_and_a_replay_is_equal(tmp_path: Path) -> None:
+    # The camera on the wrist sees nothing nearer than 0.17 m; the wall is 0.32 m away.
+    strongest = {}
+    for unseen in ("free", "half"):
+        mapped = MapSettings(unseen=unseen)  # type: ignore[arg-type]
+        with _seen("wrist", depth_map=mapped).record(tmp_path / f"{unseen}.mcap") as episode:
+            episode.arm().step(1.5, r2_n=1.0)
+        strongest[unseen] = int(episode.history.strengths.max())
+        recording = open_recording(tmp_path / f"{unseen}.mcap")
+        assert recording.headers["robot"]["settings"]["depth_map"]["unseen"] == unseen
+        assert read_tables(recording).table("unseen").numbers("left").max() > 0.5
+        compared = replay_robot(recording)
+        assert compared.made == compared.equal > 50
+    assert strongest == {"free": 0, "half": 4}

@@ -13,6 +13,7 @@ from robot_side.arm.port import ArmState
 from robot_side.recording.arm_states import pack_state, unpack_state
 from robot_side.recording.frames import ARRAYS, FramePacker, FrameUnpacker
 from robot_side.surroundings.perceived import PerceivedObjects
+from robot_side.surroundings.unknown_space import UnknownSpace
 
 ANY_FLOAT = st.floats(width=64)
 NAMES = ("table", "target", "post")
@@ -51,6 +52,7 @@ def test_every_array_of_a_frame_is_recorded() -> None:
     others = {
         "sds_m",
         "surfaces",
+        "unknown",
         "unseen_m",
         "late_s",
         "time_s",
@@ -107,6 +109,18 @@ def test_one_row_that_moves_is_all_that_is_told(row: int, value: float) -> None:
     told = packer.pack(after)
     assert len(told) < len(whole) / 10
     assert same(unpacker.unpack(told), after)
+
+
+def test_unknown_space_comes_and_goes() -> None:
+    boxes_m = np.random.default_rng(5).normal(size=(4, 2, 3))
+    packer, plain = FramePacker(), frame(2, (3,) * len(ARRAYS))
+    unpacker = FrameUnpacker(plain)
+    for shares, boxes in (((0.1, 0.2, 0.3, 0.4, 0.5), boxes_m), ((0.0,) * 5, boxes_m[1:]), ((1.0,) * 5, boxes_m[1:])):
+        read = unpacker.unpack(packer.pack(replace(plain, unknown=UnknownSpace(*shares, boxes_m=boxes)))).unknown
+        assert read is not None
+        assert read.shares == shares
+        assert same_bits(read.boxes_m, boxes)
+    assert unpacker.unpack(packer.pack(plain)).unknown is None
 
 
 def test_nobody_measures_velocities() -> None:
