@@ -7,7 +7,7 @@ from typing import Any, Final
 
 import pytest
 
-from tests.console.browser import Browser, Page
+from tests.console.browser import LARGE, SMALL, Browser, Page
 from tests.console.fed_page import fed_page
 from tests.console.run import DRAWN, Run
 
@@ -106,6 +106,24 @@ def test_the_height_is_a_line_down_in_both_views_and_the_yielding_pull_is_said(
                 assert [point[0], point[1]] == pytest.approx([0.0, below[1] * 1.2], abs=0.02)
             else:
                 assert [*point, *below] == pytest.approx([0.0, -0.1 / 0.3 / half, 0.0, -0.3 / 0.3 / half], abs=0.01)
+
+
+@pytest.mark.parametrize("size", [(640, 800), SMALL, LARGE])
+def test_the_space_that_no_depth_camera_has_seen_is_shown_by_its_side(browser: Browser, size: tuple[int, int]) -> None:
+    with fed_page(browser, size) as (fed, page):
+        page.wait("document.querySelector('.near dd')", "shown what is near")
+        assert not page.raw.locator("#near_unseen").is_visible()
+        fed.scene = {"unseen": (0.04, 0.8, 0.0, 0.555, 1.0)}
+        page.wait_for_text("#near_unseen .down", "100")
+        shares = [page.text(f"#near_unseen .{side}") for side in ("ahead", "left", "right", "up")]
+        assert shares == ["4", "80", "0", "56"]
+        title = page.raw.locator("#near_unseen").get_attribute("title") or ""
+        assert "left 80 %, ahead 4 %, right 0 %" in title
+        places = [page.raw.locator(f"#near_unseen .{side}").bounding_box() for side in ("left", "ahead", "right")]
+        assert [place["x"] for place in places] == sorted(place["x"] for place in places)
+        page.picture(f"unseen-{size[0]}x{size[1]}")
+        fed.scene = {}
+        page.wait("document.querySelector('#near_unseen').hidden", "hidden it")
 
 
 def _wait_for_change(page: Page, view: str, before: Any) -> None:
