@@ -191,8 +191,9 @@ class RobotSettings(PaperFlags, SideOptions):
         if self.perception is not None:
             require_name("perception", self.perception, (BY_DEPTH,))
         sources = [f"--{name}" for name in ("perception", "objects", "depth") if getattr(self, name) is not None]
-        if len(sources) > 1:
-            raise ValueError(f"{' and '.join(sources)} exclude each other; valid: one of them")
+        if len(sources) > 1 and sources != ["--objects", "--depth"]:
+            valid = "valid: one of them, or --objects and --depth"
+            raise ValueError(f"{' and '.join(sources)} exclude each other; {valid}")
         self.uncertainty(PredictionErrors())
 
     @property

@@ -41,6 +41,8 @@ class DepthCameraSettings:
     """Distance by which the simulated cameras are elsewhere than believed; each mm turns them by 0.1 degrees."""
     labels: bool = True
     """Whether the simulated camera has a segmentation, which tells targets and supports."""
+    known: tuple[str, ...] = ()
+    """With --perception depth: objects whose models are known. They are felt as models, and taken out of the map."""
     width: Annotated[int, Meta(ge=32, le=1280)] = 320
     height: Annotated[int, Meta(ge=32, le=1024)] = 240
     rate_hz: Annotated[float, Meta(ge=1.0, le=90.0)] = 30.0

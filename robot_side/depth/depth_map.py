@@ -11,7 +11,7 @@ from robot_side.depth.boxes import Boxes
 from robot_side.depth.free_space import SeenSpace
 from robot_side.depth.grid import Grid
 from robot_side.depth.octree.planes import Planes
-from robot_side.depth.own_body import own_pixels
+from robot_side.depth.own_body import own_pixels, within
 from robot_side.depth.picture import CameraPose, DepthErrors, DepthPicture, OwnBody
 from robot_side.depth.pointing import patch_around
 from robot_side.depth.settings import MapSettings
@@ -68,6 +68,10 @@ class DepthMap:
         depth_m = supported(measured, view)
         own = own_pixels(depth_m, view, body, self.settings.padding_m)
         merged = self.surfels.integrate(picture, depth_m, normals(depth_m, view), own, view, camera)
+        if body.models:
+            rows = self.surfels.shown
+            near = within(self.surfels.table.points_m[rows], body.known(), self.settings.padding_m)
+            self.surfels.forget(rows[near > 0])
         self.seen.see(depth_m, view)
         changed = self.planes.follow(self.surfels)
         valid = (measured >= errors.least_m) & (measured <= errors.most_m)

@@ -23,12 +23,14 @@ class SurfaceFrames:
         """
         self._slots, self._camera_sd_m, self._unseen_m_s = Slots(slots, fixed), camera_sd_m, unseen_m_s
         self._taken_s = (math.inf, math.inf)
-        self._frame = self._slots.first
+        self._frame = self._slots.frame(0.0, self._sds_m())
         self._unseen_m = 0.0
         self._unknown: UnknownSpace | None = None
 
     def take(self, changes: SlotChanges, taken_s: tuple[float, float], unknown: UnknownSpace | None = None) -> None:
-        """Take surfaces that have changed, and unseen space. taken_s: earliest and latest time of the newest picture.
+        """Take surfaces that have changed, and unseen space.
+
+        taken_s: earliest and latest time of the newest picture.
         """
         self._slots.apply(changes)
         self._taken_s, self._unseen_m, self._unknown = taken_s, math.nan, unknown

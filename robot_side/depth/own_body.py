@@ -8,15 +8,11 @@ import numpy as np
 from common.arrays import FloatArray, IntArray
 from robot_side.compiled.kernel import FLOAT64, array_of, building_block, compiled, input_array, input_indices
 from robot_side.compiled.vectors import Vector, load, norm, subtract
-from robot_side.depth.picture import DepthArray, LabelArray, OwnBody
+from robot_side.depth.picture import BOX, CAPSULE, CYLINDER, ELLIPSOID, DepthArray, LabelArray, OwnBody
 from robot_side.depth.view import MASK, PICTURE, pixel_of, ray_at, to_camera, to_world
 
 _GROWN: Final = 2
 """Pixels by which the robot's picture is grown: edges of objects smear"""
-_CAPSULE: Final = 3
-_ELLIPSOID: Final = 4
-_CYLINDER: Final = 5
-_BOX: Final = 6
 
 
 def own_pixels(depth_m: DepthArray, view: FloatArray, body: OwnBody, padding_m: float) -> LabelArray:
@@ -79,13 +75,13 @@ def _turned(rotations: FloatArray, k: int, a: Vector) -> Vector:
 def _beyond(kind: int, size: Vector, point: Vector) -> float:
     """Return the distance of a point from a solid in the solid's own frame; of ellipsoids at most as much."""
     x, y, z = abs(point[0]), abs(point[1]), abs(point[2])
-    if kind == _BOX:
+    if kind == BOX:
         return norm((max(x - size[0], 0.0), max(y - size[1], 0.0), max(z - size[2], 0.0)))
-    if kind == _CAPSULE:
+    if kind == CAPSULE:
         return norm((x, y, max(z - size[1], 0.0))) - size[0]
-    if kind == _CYLINDER:
+    if kind == CYLINDER:
         return norm((max(math.sqrt(x * x + y * y) - size[0], 0.0), max(z - size[1], 0.0), 0.0))
-    if kind == _ELLIPSOID:
+    if kind == ELLIPSOID:
         # Along the way to the centre the surface is further than across it by at most the ratio of the axes.
         length = norm((x / size[0], y / size[1], z / size[2]))
         return (length - 1.0) * min(size[0], size[1], size[2])
@@ -95,13 +91,13 @@ def _beyond(kind: int, size: Vector, point: Vector) -> float:
 @building_block
 def _radius(kind: int, size: Vector) -> float:
     """Return the radius of the sphere around a solid."""
-    if kind == _BOX:
+    if kind == BOX:
         return norm(size)
-    if kind == _CAPSULE:
+    if kind == CAPSULE:
         return size[0] + size[1]
-    if kind == _CYLINDER:
+    if kind == CYLINDER:
         return math.sqrt(size[0] * size[0] + size[1] * size[1])
-    if kind == _ELLIPSOID:
+    if kind == ELLIPSOID:
         return max(size[0], size[1], size[2])
     return size[0]
 

@@ -13,6 +13,14 @@ from common.roles import Role
 DepthArray = npt.NDArray[np.float32]
 LabelArray = npt.NDArray[np.uint8]
 
+SPHERE: Final = 2
+CAPSULE: Final = 3
+ELLIPSOID: Final = 4
+CYLINDER: Final = 5
+BOX: Final = 6
+"""Kinds of solids, by MuJoCo's numbers of geoms"""
+SOLID_NUMBERS: Final = 16
+"""Kind, centre (3), rotation by rows (9) and sizes (3) of a solid"""
 UNLABELLED: Final = 0
 """Label of a pixel about which the segmentation says nothing"""
 
@@ -73,9 +81,9 @@ class DepthErrors:
 
 @dataclass(frozen=True, eq=False)
 class OwnBody:
-    """Solids of the robot and of what it holds, in the world frame: (n,) kinds by MuJoCo's numbers of geoms.
+    """Solids of the robot, of what it holds, and of known models, in the world frame: (n,) kinds.
 
-    2: sphere, 3: capsule, 4: ellipsoid, 5: cylinder, 6: box; sizes as MuJoCo gives them.
+    Sizes are as MuJoCo gives them.
     """
 
     kinds: npt.NDArray[np.int64]
@@ -85,3 +93,11 @@ class OwnBody:
     """(n, 3, 3) rotations, solid to world"""
     sizes_m: FloatArray
     """(n, 3) sizes: radius; radius and half length; half axes; radius and half length; half sizes"""
+    models: int = field(default=0, kw_only=True)
+    """Number of solids, the last ones, that are known models: no surface stays near these"""
+
+    def known(self) -> "OwnBody":
+        """Return the known models alone."""
+        first = len(self.kinds) - self.models
+        placed = self.positions_m[first:], self.rotations[first:]
+        return OwnBody(self.kinds[first:], *placed, self.sizes_m[first:], models=self.models)

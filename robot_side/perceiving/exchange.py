@@ -53,6 +53,8 @@ class Joints(msgspec.Struct, frozen=True, tag=True):
     """(f,) float64: readings of the gripper's joints"""
     held: bytes
     """(k, 4) float64: spheres of what the gripper holds, in the tool's frame; centres and radii"""
+    models: bytes | None = None
+    """(k, 16) float64: solids of known models (`OwnBody`); None: as they were"""
     positions: bytes = b""
     """MuJoCo's qpos, as float64; empty if nothing is simulated"""
 

@@ -73,6 +73,10 @@ class Surfaced(Listener):
         self._begins_s, self._taken_s, self._told_s = -math.inf, -math.inf, -math.inf
         self._is_old, self._is_new, self._is_ready = False, False, False
         self._looked_s, self._pictures, self._said_crowded = -math.inf, 0, False
+        self._solids: bytes | None = None
+        """Solids of known models; None if there are none"""
+        self._news: bytes | None = None
+        """What of these the companion has not been told"""
         self._figures: Counter[str] = Counter()
         self._newest: dict[str, float] = {}
         self._ages_s: list[float] = []
@@ -91,6 +95,10 @@ class Surfaced(Listener):
         if self._companion is not None and self._growing is None and not self._is_new:
             self._companion.channel.send(encode(RoleOf(name, role)))
 
+    def explain(self, solids: FloatArray) -> None:
+        """Take solids (k, 16) of known models out of the map, from the next picture on."""
+        self._solids = self._news = solids.tobytes()
+
     def put_back(self) -> None:
         """Forget what was seen, as the objects were put back."""
         if self._companion is not None:
@@ -107,8 +115,9 @@ class Surfaced(Listener):
         if self._companion is not None:
             joints = state.joint_positions_rad.tobytes(), state.finger_positions.tobytes()
             positions = b"" if self._scene is None else self._scene.data.qpos.tobytes()
+            models, self._news = self._news, None
             self._companion.channel.send(
-                encode(Joints(state.time_s, *joints, b"" if held is None else held.tobytes(), positions))
+                encode(Joints(state.time_s, *joints, b"" if held is None else held.tobytes(), models, positions))
             )
 
     def begin(self, now_s: float) -> None:
@@ -116,6 +125,7 @@ class Surfaced(Listener):
         self._begins_s, self._is_new, self._is_ready, self._pictures = now_s, True, False, 0
         self._companion = self._start()
         self._companion.channel.send(self._setup)
+        self._news = self._solids
 
     def wait(self, arm: Arm, scene: Scene, clock: Clock, meanwhile: Callable[[], object]) -> None:
         """Wait for the first map, however long; a signal ends the wait. meanwhile: called some 100 times a second.

@@ -11,7 +11,7 @@ from common.errors import ConfigurationError
 from common.roles import Role
 from robot_side.depth.camera_settings import LinkMount
 from robot_side.depth.perception import DepthPerception
-from robot_side.depth.picture import DepthErrors
+from robot_side.depth.picture import SOLID_NUMBERS, DepthErrors
 from robot_side.depth.slots import SlotChanges
 from robot_side.drivers.mujoco.depth_cameras.posed_robot import PosedRobot
 from robot_side.drivers.mujoco.depth_cameras.rig import DepthRig
@@ -85,6 +85,8 @@ class SimulatedPictures:
         """Take where everything was."""
         self._positions = np.frombuffer(joints.positions)
         self._rig.hold(np.frombuffer(joints.held).reshape(-1, 4))
+        if joints.models is not None:
+            self._rig.explain(np.frombuffer(joints.models).reshape(-1, SOLID_NUMBERS))
 
     def set_role(self, name: str, role: Role) -> None:
         """Change the role of a surface."""
@@ -118,6 +120,8 @@ class SentPictures:
         self._remote, self._robot, self._mounts, self._errors = remote, robot, mounts, errors
         self.perception, self._perceive = perceive(), perceive
         self._motion: deque[tuple[float, FloatArray, FloatArray]] = deque()
+        self._models: deque[tuple[float, FloatArray]] = deque()
+        """Solids of known models, and from when on they were there"""
         self.cameras: dict[str, int] = {}
         """Numbers of the cameras whose pictures were mapped, by name"""
         self._taken_s: dict[str, tuple[float, float]] = {}
@@ -126,6 +130,10 @@ class SentPictures:
     def hear(self, joints: Joints) -> None:
         """Take where the robot was."""
         self._robot.held = np.frombuffer(joints.held).reshape(-1, 4)
+        if joints.models is not None:
+            self._models.append((joints.time_s, np.frombuffer(joints.models).reshape(-1, SOLID_NUMBERS)))
+            while len(self._models) > 1 and self._models[1][0] < joints.time_s - _REMEMBERED_S:
+                self._models.popleft()
         self._motion.append((joints.time_s, np.frombuffer(joints.arm), np.frombuffer(joints.fingers)))
         while self._motion[0][0] < joints.time_s - _REMEMBERED_S:
             self._motion.popleft()
@@ -174,6 +182,9 @@ class SentPictures:
         if not self._motion or now_s - middle_s > _LATE_S:
             return False
         self._robot.pose(*self._joints_at(middle_s))
+        for from_s, solids in self._models:
+            if from_s <= middle_s or from_s == self._models[0][0]:
+                self._robot.models = solids
         try:
             pose = self._robot.camera(mount.link, mount)
         except ConfigurationError as error:

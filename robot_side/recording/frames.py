@@ -150,7 +150,10 @@ class FrameUnpacker:
         names, position = (last.names, position) if last is not None else _content(content, position, tuple[str, ...])
         if library is None:
             others = names != self._scene.names
-            if others and len(arrays["mesh_index"]):
+            meshed = {names[thing].rstrip("!") for thing in arrays["mesh_object"].tolist()}
+            if meshed and meshed <= set(self._scene.names):
+                others = False
+            elif others and meshed:
                 raise ValueError("the frame has other objects than the scene")
             library = None if others else self._scene.mesh_library
         roles = tuple(_ROLES[role] for role in content[position:])

@@ -88,14 +88,17 @@ def joined(frame: PerceivedObjects, fixed: PerceivedObjects) -> PerceivedObjects
     # What the frame does not know of its own objects stays unknown; fixed ones are known, and rest.
     known: dict[str, Any] = {
         name: None if getattr(frame, name) is None else np.concatenate([getattr(frame, name), getattr(fixed, name)])
-        for name in ("positions_m", "rotations", "velocities_m_s")
+        for name in ("positions_m", "rotations")
     }
+    if frame.velocities_m_s is not None:
+        rests = np.zeros((len(fixed.names), 3)) if fixed.velocities_m_s is None else fixed.velocities_m_s
+        known["velocities_m_s"] = np.concatenate([frame.velocities_m_s, rests])
     sds_m = np.full(count, np.nan) if frame.sds_m is None else frame.sds_m
     return PerceivedObjects(
         time_s=frame.time_s,
         names=frame.names + names,
         roles=frame.roles + fixed.roles,
-        mesh_library=frame.mesh_library,
+        mesh_library=frame.mesh_library or fixed.mesh_library,
         sds_m=np.concatenate([sds_m, np.zeros(len(fixed.names))]),
         unseen_m=frame.unseen_m,
         late_s=frame.late_s,

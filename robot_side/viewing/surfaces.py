@@ -5,8 +5,9 @@ from scipy.spatial.transform import Rotation
 
 from common.roles import ROLES
 from robot_side.drivers.mujoco.scene import Scene
+from robot_side.surroundings.joined_frames import only
 from robot_side.surroundings.perceived import PerceivedObjects
-from robot_side.viewing.shapes import SceneModel
+from robot_side.viewing.perceived_shapes import PerceivedModel
 
 _SPECK_M = 0.001
 """Half size up to which a box is a piece of the target that is not in use"""
@@ -14,14 +15,22 @@ _PARKED_BELOW_M = -100.0
 """Height below which no surface is: unused ones are parked there"""
 
 
-class SurfaceModel(SceneModel):
-    """Links of a scene's robot, surfaces, and the fixed objects behind these."""
+class SurfaceModel(PerceivedModel):
+    """Links of a scene's robot, surfaces, and the objects behind these: fixed ones, and known models."""
 
     def __init__(self, scene: Scene, fixed: PerceivedObjects, surfaces: int) -> None:
-        """surfaces: number of objects of the pool. fixed: as for SceneModel."""
-        super().__init__(scene, fixed)
-        self.surfaces, self.objects, self._geoms = surfaces, fixed.names, []
-        self.may_move = np.arange(len(fixed.names))
+        """surfaces: number of objects of the pool. fixed: objects behind these, until a frame has others."""
+        super().__init__(scene)
+        self.surfaces, self._names = surfaces, fixed.names
+        super().update(fixed)
+
+    def update(self, objects: PerceivedObjects) -> bool:
+        """Return whether a frame has other objects behind the surfaces than the last one."""
+        names = objects.names[self.surfaces :]
+        if names == self._names:
+            return False
+        self._names = names
+        return super().update(only(objects, range(self.surfaces, len(objects.names))))
 
 
 def seen_surfaces(objects: PerceivedObjects, count: int) -> tuple[bytes, bytes]:

@@ -88,6 +88,14 @@ class SurfelMap:
         top = int(self._counts[Count.TOP])
         return np.flatnonzero((self.table.cells[:top] >= 0) & (self.table.shown[:top] > 0))
 
+    def forget(self, rows: IntArray) -> None:
+        """Remove these surfels (n,)."""
+        self.look_again(rows)
+        free, cells = int(self._counts[Count.FREE]), self.table.cells
+        self.slot[cells[rows]], cells[rows] = -1, -1
+        self.table.free[free : free + len(rows)] = rows
+        self._counts[Count.FREE] += len(rows)
+
     def look_again(self, rows: IntArray) -> None:
         """Let surfaces be looked for again where these surfels (n,) are."""
         cells, (_, across, up) = self.grid.cells, self.grid.blocks

@@ -50,7 +50,7 @@ def test_unseen_space_ahead_is_free_or_has_half_strength_and_a_replay_is_equal(t
     # The camera on the wrist sees nothing nearer than 0.17 m; the wall is 0.32 m away.
     strongest = {}
     for unseen in ("free", "half"):
-        mapped = MapSettings(unseen=unseen)  # type: ignore[arg-type]
+        mapped = MapSettings(unseen=unseen)
         with _seen("wrist", depth_map=mapped).record(tmp_path / f"{unseen}.mcap") as episode:
             episode.arm().step(1.5, r2_n=1.0)
         strongest[unseen] = int(episode.history.strengths.max())

@@ -9,7 +9,7 @@ import numpy as np
 
 from common.arrays import FloatArray, IntArray
 from common.errors import ConfigurationError
-from robot_side.depth.picture import CameraPose, OwnBody
+from robot_side.depth.picture import SOLID_NUMBERS, CameraPose, OwnBody
 from robot_side.drivers.mujoco.model_enums import GeomKind
 from robot_side.drivers.mujoco.robot_model import RobotModel
 from robot_side.surroundings.mount import Mount
@@ -53,6 +53,8 @@ class PosedRobot:
         self._kinds, self._sizes_m = kinds, sizes_m
         self.held: FloatArray = np.empty((0, 4))
         """(k, 4) spheres of what the gripper holds, in the tool's frame: centres and radii"""
+        self.models: FloatArray = np.empty((0, SOLID_NUMBERS))
+        """(k, 16) solids of known models, in the world frame"""
         self._middles_m: FloatArray = np.where(boxed[:, None], model.geom_aabb[self._geoms, :3], 0.0)
         """(g, 3) centres of the solids in their geoms' frames"""
 
@@ -63,16 +65,17 @@ class PosedRobot:
         mujoco.mj_kinematics(self._model, self._data)
 
     def body(self) -> OwnBody:
-        """Return the solids of the robot, and of what it holds, in the present pose."""
+        """Return the solids of the robot and of what it holds, in the present pose, and of known models."""
         rotations = self._data.geom_xmat[self._geoms].reshape(-1, 3, 3)
         middles_m = self._data.geom_xpos[self._geoms] + np.einsum("gij,gj->gi", rotations, self._middles_m)
         tool = self.tool_rotation()
-        count = len(self.held)
+        count, models = len(self.held), self.models
         return OwnBody(
-            np.concatenate([self._kinds, np.full(count, GeomKind.SPHERE)]),
-            np.concatenate([middles_m, self.tool_m() + self.held[:, :3] @ tool.T]),
-            np.concatenate([rotations, np.tile(np.eye(3), (count, 1, 1))]),
-            np.concatenate([self._sizes_m, np.tile(self.held[:, 3:], (1, 3))]),
+            np.concatenate([self._kinds, np.full(count, GeomKind.SPHERE), models[:, 0].astype(np.int64)]),
+            np.concatenate([middles_m, self.tool_m() + self.held[:, :3] @ tool.T, models[:, 1:4]]),
+            np.concatenate([rotations, np.tile(np.eye(3), (count, 1, 1)), models[:, 4:13].reshape(-1, 3, 3)]),
+            np.concatenate([self._sizes_m, np.tile(self.held[:, 3:], (1, 3)), models[:, 13:]]),
+            models=len(models),
         )
 
     def camera(self, link: str, mount: Mount) -> CameraPose:

@@ -90,6 +90,10 @@ class DepthRig:
         """Take what the gripper holds from now on: (k, 4) spheres in the tool's frame; None if it holds nothing."""
         self._robot.held = np.empty((0, 4)) if held is None else held
 
+    def explain(self, solids: FloatArray) -> None:
+        """Take solids (k, 16) of known models out of the map, from the next picture on."""
+        self._robot.models = solids
+
     def take_of(self, positions: FloatArray, now_s: float, roles: Mapping[str, Role]) -> None:
         """Take a picture with each camera of the state with qpos `positions` (nq,)."""
         if self._posed is None:

@@ -4,8 +4,12 @@ import math
 from collections.abc import Callable
 from typing import Final
 
+import numpy as np
+
+from common.arrays import FloatArray
 from common.roles import Role
 from robot_side.depth.frames import SurfaceFrames
+from robot_side.depth.picture import SOLID_NUMBERS
 from robot_side.drivers.mujoco.depth_cameras.rig import DepthRig
 from robot_side.drivers.mujoco.scene import Scene
 from robot_side.surroundings.perceived import PerceivedObjects
@@ -23,11 +27,13 @@ class SimulatedDepth(Listener):
         self._rig: DepthRig | None = None
         self._frames = frames()
         self._number, self._origin_s = -1, 0.0
+        self._solids: FloatArray = np.empty((0, SOLID_NUMBERS))
 
     def perceive(self, now_s: float) -> PerceivedObjects:
         """Return the newest frame at `now_s`; its pictures were taken by the cameras' latency before."""
         if self._rig is None:
             self._rig, self._origin_s = self._make(), now_s
+        self._rig.explain(self._solids)
         number = math.floor((now_s - self._origin_s) * self._rig.rate_hz + _SOON_S)
         if number > self._number:
             self._number = number
@@ -36,6 +42,10 @@ class SimulatedDepth(Listener):
             changes, taken_s = news
             self._frames.take(changes, (taken_s, taken_s), self._rig.unknown())
         return self._frames.at(now_s)
+
+    def explain(self, solids: FloatArray) -> None:
+        """Take solids (k, 16) of known models out of the map, from the next picture on."""
+        self._solids = solids
 
     def on_tick(self, tick: Tick) -> None:
         """Take what the gripper holds."""
