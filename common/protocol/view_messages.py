@@ -180,7 +180,7 @@ class SceneState(Message, frozen=True, tag="scene"):
     overlaps: tuple[tuple[_Index, float, float], ...]
     """(object index, volume for L2, for R2): what each object shares, in m³, with the union of the gripper's spheres,
     inflated by D_σ and moved by the robot side's δ. Space within several objects counts for one: the volumes add up.
-    Worked out ten times a second"""
+    The index behind the last object's is that of all surfaces. Worked out ten times a second"""
     l2: EnlargementTerms
     r2: EnlargementTerms
     tick_p50_us: float

@@ -126,7 +126,7 @@ def shown_view(message: AnyViewMessage | Telemetry, now_s: float, objects: tuple
     elif isinstance(message, SceneState):
         yield _shown("/enlargement", now_s, stamps, {"l2": by_name(message.l2), "r2": by_name(message.r2)})
         of_objects = [
-            {"object": objects[index] if index < len(objects) else str(index), "l2_mm3": 1e9 * l2, "r2_mm3": 1e9 * r2}
+            {"object": (*objects, "surfaces")[min(index, len(objects))], "l2_mm3": 1e9 * l2, "r2_mm3": 1e9 * r2}
             for index, l2, r2 in message.overlaps
         ]
         yield _shown("/overlap", now_s, stamps, {"objects": of_objects})

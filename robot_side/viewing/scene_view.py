@@ -173,6 +173,8 @@ class SceneView:
     def _state(self, header: Header, begun: "_Begun", ticks: TickFigures) -> SceneState:
         objects, pose = begun.situation.objects, begun.situation.pose
         l2_m3, r2_m3, first = begun.overlaps_m3["l2"], begun.overlaps_m3["r2"], self._model.surfaces
+        l2_seen_m3, r2_seen_m3 = (sum(m3 for k, m3 in side.items() if k < first) for side in (l2_m3, r2_m3))
+        surfaces = ((len(objects.names) - first, l2_seen_m3, r2_seen_m3),) if l2_seen_m3 or r2_seen_m3 else ()
         return SceneState(
             header,
             version=begun.version,
@@ -187,7 +189,8 @@ class SceneView:
                 (thing - first, l2_m3.get(thing, 0.0), r2_m3.get(thing, 0.0))
                 for thing in sorted(l2_m3.keys() | r2_m3.keys())
                 if thing >= first
-            ),
+            )
+            + surfaces,
             l2=begun.terms["l2"],
             r2=begun.terms["r2"],
             tick_p50_us=ticks.p50_us,

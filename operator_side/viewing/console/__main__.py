@@ -236,7 +236,7 @@ class _Process:
             "overlap_mm3": (1e9 * total_l2, 1e9 * total_r2),
             "objects": [
                 {
-                    "name": names[index] if index < len(names) else f"object {index}",
+                    "name": names[index] if index < len(names) else "surfaces",
                     "role": _role(state, index).value,
                     "overlap_mm3": (1e9 * by_l2, 1e9 * by_r2),
                 }

@@ -3,7 +3,7 @@ import pytest
 
 from common.roles import ROLES, Role
 from robot_side.depth.depth_map import DepthMap
-from robot_side.depth.picture import CameraPose, DepthErrors, DepthPicture, OwnBody
+from robot_side.depth.picture import SPHERE, CameraPose, DepthErrors, DepthPicture, OwnBody
 from robot_side.depth.settings import MapSettings
 from tests.robot_side.depth.mapping import NOBODY, Watching, fronts, near
 from tests.robot_side.depth.ray_cast import Ball, Box, Camera, Rod, Thing, looking
@@ -218,3 +218,16 @@ def test_what_one_camera_sees_behind_a_post_stays_although_the_other_sees_only_t
         watching.time_s += 0.033
     # Straight behind the post, where the camera ahead sees the post alone.
     assert near(watching.map.boxes(), (0.61, 0.0, 0.4), 0.09) > 0
+
+
+def test_what_a_model_explains_is_taken_out_of_the_map_also_what_was_there_before() -> None:
+    watching = _watching()
+    watching.look(AHEAD, [FAR_WALL, BALL], 5)
+    assert near(watching.map.boxes(), BALL.center_m, 0.06) > 10
+    ball = np.array([BALL.center_m]), np.eye(3)[None], np.full((1, 3), BALL.radius_m)
+    watching.look(AHEAD, [FAR_WALL, BALL], 2, OwnBody(np.array([SPHERE]), *ball, models=1))
+    assert near(watching.map.boxes(), BALL.center_m, 0.06) == 0
+    # What is behind it stays, and without the model the ball comes back.
+    assert near(watching.map.boxes(), (0.9, 0.3, 0.4), 0.2) > 0
+    watching.look(AHEAD, [FAR_WALL, BALL], 2)
+    assert near(watching.map.boxes(), BALL.center_m, 0.06) > 10

@@ -175,6 +175,21 @@ def test_where_the_robot_is_goes_to_the_companion_with_what_it_holds(desk: Desk)
     assert np.frombuffer(joints.held).tolist() == [0.0, 0.0, 0.1, 0.02]
 
 
+def test_known_models_go_to_the_companion_once_and_to_each_new_one(desk: Desk) -> None:
+    companion = desk.begin(10.0)
+    solids = np.arange(32.0).reshape(2, 16)
+    desk.end.explain(solids)
+    companion.heard()
+    for step in range(2):
+        desk.end.tell(_state(10.0 + step), 10.0 + step)
+    assert [one.models for one in companion.heard()] == [solids.tobytes(), None]
+    companion.other.close()
+    desk.look(12.0)
+    desk.look(14.1)
+    desk.end.tell(_state(14.2), 14.2)
+    assert desk.companions[1].heard()[-1].models == solids.tobytes()
+
+
 def test_a_role_goes_to_the_companion(desk: Desk) -> None:
     companion = desk.begin(10.0)
     companion.heard()

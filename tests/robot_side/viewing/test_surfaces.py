@@ -18,6 +18,7 @@ from robot_side.surroundings.fixed_objects import joined
 from robot_side.surroundings.perceived import PerceivedObjects
 from robot_side.viewing.scene_view import SURFACES_BYTES_PER_S, SceneView
 from robot_side.viewing.surfaces import SurfaceModel, seen_surfaces
+from tests.helpers.perceived_scenes import Scene
 from tests.robot_side.viewing.test_shapes import finished, shapes_of
 
 SLOTS = 64
@@ -26,10 +27,10 @@ ROLES_GIVEN = np.array([-1, ROLES.index(Role.TARGET), ROLES.index(Role.SUPPORT)]
 ROW_BYTES = 41
 
 
-def seen(count: int = 3) -> PerceivedObjects:
-    """Return a frame of surfaces in a row, 0.1 m apart."""
+def seen(count: int = 3, first_m: tuple[float, float, float] = (0.0, 0.2, 0.3)) -> PerceivedObjects:
+    """Return a frame of surfaces in a row along x, 0.1 m apart."""
     mapped, shown = Slots(SLOTS), Slots(SLOTS)
-    centers_m = np.stack([0.1 * np.arange(count), np.full(count, 0.2), np.full(count, 0.3)], axis=1)
+    centers_m = np.array(first_m) + 0.1 * np.arange(count)[:, None] * (1.0, 0.0, 0.0)
     boxes = Boxes(
         ids=np.arange(count),
         centers_m=centers_m,
@@ -118,6 +119,34 @@ def test_over_a_slow_link_they_come_less_often(viewer: Viewer) -> None:
     slow = ROW_BYTES * SLOTS / every_s
     states = [viewer.state(200.0 + tick, slow) for tick in range(9)]
     assert [tick for tick, state in enumerate(states) if state.surfaces is not None] == [0, 4, 8]
+
+
+def test_the_volumes_shared_with_surfaces_are_one_row_behind_the_objects(viewer: Viewer) -> None:
+    viewer.show(seen())
+    assert viewer.state(220.0).overlaps == ()
+    assert viewer.robot.newest is not None
+    x, y, z = viewer.robot.newest[1].pose.tool_position_m.tolist()
+    viewer.show(seen(3, (x - 0.1, y, z)))
+    ((index, _, r2_m3),) = viewer.state(221.0).overlaps
+    assert index == len(viewer.shapes().objects) == 1
+    assert r2_m3 > 1e-6
+
+
+def test_models_behind_the_surfaces_have_shapes(viewer: Viewer) -> None:
+    scene = Scene()
+    scene.add().sphere([0.6, 0.0, 0.3], 0.05)
+    ball = replace(scene.objects(), positions_m=np.array([[0.6, 0.0, 0.3]]), rotations=np.eye(3)[None])
+    viewer.show(seen())
+    assert viewer.robot.newest is not None
+    sensed, situation = viewer.robot.newest
+    viewer.robot.newest = sensed, replace(situation, objects=joined(situation.objects, ball))
+    assert viewer.view.outdated(viewer.robot.newest[1].objects)
+    shapes = viewer.shapes()
+    assert shapes.objects == ("keep out 1", ball.names[0])
+    assert {(shape.owner, shape.kind) for shape in shapes.shapes if not shape.of_robot} == {(0, "box"), (1, "sphere")}
+    viewer.show(seen())
+    assert viewer.view.outdated(viewer.robot.newest[1].objects)
+    assert viewer.shapes().objects == ("keep out 1",)
 
 
 def test_that_none_is_left_is_told_too(viewer: Viewer) -> None:
