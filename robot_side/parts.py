@@ -16,7 +16,6 @@ from robot_side.arm.following import Following
 from robot_side.arm.limits import JointLimits
 from robot_side.compiled.kernel import Compiled, imported_kernels
 from robot_side.core.robot_parts import RobotParts
-from robot_side.depth.camera_settings import BY_DEPTH
 from robot_side.drivers.mujoco.arm import MujocoArm, stand
 from robot_side.drivers.mujoco.checks.cost import cost_findings
 from robot_side.drivers.mujoco.checks.following import following_findings
@@ -47,8 +46,7 @@ from robot_side.operators.episodes import Episodes
 from robot_side.operators.operator_session import OperatorSession
 from robot_side.operators.safety import Safety
 from robot_side.operators.tuning import Tuning
-from robot_side.perceiving.known_models import Surfaces, WithModels
-from robot_side.perceiving.object_source import simulated_camera, source_of
+from robot_side.perceiving.object_source import simulated_camera, source_of, with_known
 from robot_side.settings import RobotSettings
 from robot_side.surroundings.fixed_objects import fixed_objects, with_fixed
 from robot_side.surroundings.perceived import KINDS, ObjectSource, PerceivedObjects, PutBack
@@ -95,7 +93,7 @@ def build_parts(
     announce: Callable[[str], None] | None = None,
     drivers: ConnectedDrivers | None = None,
     law: object = None,
-    surfaces: Surfaces | None = None,
+    surfaces: ObjectSource | None = None,
 ) -> SceneParts:
     """Make the parts; ConfigurationError for a model that cannot be used.
 
@@ -125,15 +123,10 @@ def build_parts(
     kinematics = MujocoKinematics(scene, settings.cover_m, searching)
     camera = simulated_camera(settings, scene, int(camera_noise))
     surroundings = Surroundings()
-    unseen_m_s = settings.camera.unseen_m_s
-    seen_elsewhere = None if drivers is None else drivers.objects(settings.roles, unseen_m_s, surroundings.see)
+    about = settings.roles, settings.camera.unseen_m_s, surroundings.see
+    sent = None if drivers is None else drivers.objects(*about)
     fixed = fixed_objects(settings.workspace_m, settings.arm_keep_out)
-    source = seen_elsewhere or surfaces or source_of(settings, scene, camera, int(camera_noise))
-    known = settings.depth_camera.known if settings.perception == BY_DEPTH else ()
-    if settings.depth is not None and seen_elsewhere and surfaces:
-        source = WithModels(surfaces, seen_elsewhere)
-    elif known:
-        source = WithModels(source, camera, known)  # type: ignore[arg-type]  # a source of surfaces
+    source = with_known(settings, surfaces or source_of(settings, scene, camera, int(camera_noise)), sent, camera)
     # Before the first tick, as a search for spheres takes far longer than one.
     first = perceived([], [], 0.0) if settings.sees_any else as_loaded(scene, scene.roles)
     held_covers = HeldCovers(first, settings.cover_m, scene.never_held, searching)

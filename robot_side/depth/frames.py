@@ -7,8 +7,7 @@ import numpy as np
 from common.arrays import FloatArray
 from robot_side.depth.slots import SlotChanges, Slots
 from robot_side.surroundings.age import since
-from robot_side.surroundings.perceived import PerceivedObjects
-from robot_side.surroundings.unknown_space import UnknownSpace
+from robot_side.surroundings.perceived import PerceivedObjects, UnknownSpace
 
 
 class SurfaceFrames:

@@ -10,7 +10,7 @@ from robot_side.depth.own_body import within
 from robot_side.depth.picture import DepthArray, OwnBody
 from robot_side.depth.settings import MapSettings
 from robot_side.depth.view import LEAST, PICTURE, pixel_of, to_camera
-from robot_side.surroundings.unknown_space import UnknownSpace
+from robot_side.surroundings.perceived import UnknownSpace
 
 _CELL_M: Final = 0.04
 _STEEP: Final = 0.99

@@ -9,7 +9,7 @@ from robot_side.depth.depth_map import DepthMap, Integrated
 from robot_side.depth.picture import CameraPose, DepthErrors, DepthPicture, OwnBody
 from robot_side.depth.settings import MapSettings
 from robot_side.depth.slots import EXACT, TARGET_NAME, SlotChanges, Slots
-from robot_side.surroundings.unknown_space import UnknownSpace
+from robot_side.surroundings.perceived import UnknownSpace
 
 _AROUND_M: Final = (0.06, 0.25)
 """Half width of the gripper's section, and reach, within which unseen space is told"""

@@ -19,8 +19,7 @@ from robot_side.depth.together import largest_piece, planes_of
 from robot_side.surroundings.fixed_objects import joined
 from robot_side.surroundings.kinds.layout import NUMBERS
 from robot_side.surroundings.movers import Movers
-from robot_side.surroundings.perceived import PerceivedObjects
-from robot_side.surroundings.unknown_space import UnknownSpace
+from robot_side.surroundings.perceived import PerceivedObjects, UnknownSpace
 
 _PARKED_M: Final = -1000.0
 """Height of unused slots"""

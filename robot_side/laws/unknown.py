@@ -11,9 +11,8 @@ from robot_side.field.field import Ahead
 from robot_side.field.object_class import OBSTACLE
 from robot_side.laws.prospect import Asked
 from robot_side.surroundings.fixed_objects import fixed_objects
-from robot_side.surroundings.perceived import PerceivedObjects
+from robot_side.surroundings.perceived import PerceivedObjects, UnknownSpace
 from robot_side.surroundings.scene_table import SceneTable, make
-from robot_side.surroundings.unknown_space import UnknownSpace
 from robot_side.tick.sensed import STRENGTHS
 
 HALF: Final = STRENGTHS // 2

@@ -14,7 +14,7 @@ from common.sockets.door.messages import DoorSettings
 from robot_side.depth.camera_settings import DepthCameraSettings, LinkMount
 from robot_side.depth.settings import MapSettings
 from robot_side.depth.slots import BOX_NUMBERS, SlotChanges
-from robot_side.surroundings.unknown_space import UnknownSpace
+from robot_side.surroundings.perceived import UnknownSpace
 
 
 class Loaded(msgspec.Struct, frozen=True):

@@ -1,7 +1,7 @@
 """Known models beside the surfaces that depth cameras see: they are felt as models, and taken out of the map."""
 
 from collections.abc import Sequence
-from typing import Final, Protocol
+from typing import Final, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -9,7 +9,8 @@ from common.arrays import FloatArray
 from common.errors import ConfigurationError
 from common.roles import Role
 from robot_side.depth.picture import BOX, ELLIPSOID, SOLID_NUMBERS, SPHERE
-from robot_side.surroundings.joined_frames import JoinedFrames, only
+from robot_side.perceiving.joined_frames import JoinedFrames
+from robot_side.surroundings.fixed_objects import only
 from robot_side.surroundings.kinds.layout import HALF_SPACE, TETRAHEDRON
 from robot_side.surroundings.kinds.layout import SPHERE as SPHERE_KIND
 from robot_side.surroundings.perceived import ObjectSource, PerceivedObjects
@@ -39,7 +40,8 @@ def solids_of(frame: PerceivedObjects) -> FloatArray:
     return seen
 
 
-class Surfaces(ObjectSource, Protocol):
+@runtime_checkable
+class Mapped(ObjectSource, Protocol):
     """Source of what depth cameras see."""
 
     def explain(self, solids: FloatArray) -> None:
@@ -58,7 +60,7 @@ class Surfaces(ObjectSource, Protocol):
 class WithModels(Listener):
     """Source of surfaces, and of objects whose models are known, behind these in each frame."""
 
-    def __init__(self, surfaces: Surfaces, models: ObjectSource, names: Sequence[str] | None = None) -> None:
+    def __init__(self, surfaces: Mapped, models: ObjectSource, names: Sequence[str] | None = None) -> None:
         """names: which of the objects are known; None: all."""
         self._surfaces, self._models, self._names = surfaces, models, names
         self._joined = JoinedFrames()

@@ -8,6 +8,7 @@ from robot_side.depth.frames import SurfaceFrames
 from robot_side.drivers.mujoco.camera import CameraError, MujocoCamera
 from robot_side.drivers.mujoco.encoders import Encoder
 from robot_side.drivers.mujoco.scene import Scene
+from robot_side.perceiving.known_models import Mapped, WithModels
 from robot_side.perceiving.own_perception import perceived_by
 from robot_side.settings import RobotSettings
 from robot_side.surroundings.fixed_objects import fixed_objects
@@ -35,6 +36,19 @@ def source_of(settings: RobotSettings, scene: Scene, camera: MujocoCamera, seed:
         lambda: DepthRig(scene, settings.depth_camera, settings.depth_map, encoder, seed),
         partial(surface_frames, settings),
     )
+
+
+def with_known(
+    settings: RobotSettings, mapped: ObjectSource, sent: ObjectSource | None, camera: ObjectSource
+) -> ObjectSource:
+    """Return the source of all objects, with the known models if there are any beside surfaces.
+
+    mapped: what depth cameras see, or the simulation's source. sent: that of --objects. camera: the simulated one.
+    """
+    known = settings.depth_camera.known if settings.perception == BY_DEPTH else ()
+    if isinstance(mapped, Mapped) and (sent is not None or known):
+        return WithModels(mapped, sent or camera, None if sent is not None else known)
+    return sent or mapped
 
 
 def simulated_camera(settings: RobotSettings, scene: Scene, seed: int) -> MujocoCamera:

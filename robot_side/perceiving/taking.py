@@ -18,7 +18,7 @@ from robot_side.drivers.mujoco.depth_cameras.rig import DepthRig
 from robot_side.drivers.mujoco.scene import Scene
 from robot_side.drivers.remote.depth import RemoteDepth, TakenDepth
 from robot_side.perceiving.exchange import Joints
-from robot_side.surroundings.unknown_space import UnknownSpace
+from robot_side.surroundings.perceived import UnknownSpace
 
 _REMEMBERED_S: Final = 3.0
 """Time for which the robot's motion is remembered"""

@@ -24,8 +24,7 @@ import numpy as np
 
 from common.recording.entries import FRAME, HAS_UNKNOWN, SHARES
 from common.roles import Role
-from robot_side.surroundings.perceived import KINDS, PerceivedObjects, library_of
-from robot_side.surroundings.unknown_space import UnknownSpace
+from robot_side.surroundings.perceived import KINDS, PerceivedObjects, UnknownSpace, library_of
 
 ARRAYS: Final[Mapping[str, tuple[type, tuple[int, ...]]]] = {
     name: described

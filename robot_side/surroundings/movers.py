@@ -15,9 +15,8 @@ import numpy as np
 from common.arrays import FloatArray, IntArray
 from common.roles import Role
 from robot_side.surroundings.kinds.layout import NUMBERS, rows
-from robot_side.surroundings.perceived import KINDS, PerceivedObjects
+from robot_side.surroundings.perceived import KINDS, PerceivedObjects, UnknownSpace
 from robot_side.surroundings.placing import numbers_of, primitives_of
-from robot_side.surroundings.unknown_space import UnknownSpace
 
 OF_OBJECTS: Final = {"positions_m": (3,), "rotations": (3, 3), "velocities_m_s": (3,)}
 """Arrays of a frame that have a row for each object, and the shape of a row, in the order of an object's numbers"""

@@ -9,7 +9,6 @@ import numpy as np
 from common.arrays import FloatArray, IntArray
 from common.roles import Role
 from robot_side.surroundings.kinds import box, ellipsoid, half_space, mesh, sphere, tetrahedron
-from robot_side.surroundings.unknown_space import UnknownSpace
 
 if TYPE_CHECKING:
     # A scene without meshes does not load the kernels for them.
@@ -18,6 +17,25 @@ if TYPE_CHECKING:
 
 KINDS: Final = (sphere.KIND, box.KIND, tetrahedron.KIND, half_space.KIND, mesh.KIND, ellipsoid.KIND)
 """Kinds of primitives; each has the index that is its number in `kinds.layout`, and its arrays in PerceivedObjects."""
+
+
+@dataclass(frozen=True, eq=False)
+class UnknownSpace:
+    """Shares, 0 to 1, of the space on each side of the gripper that nobody has seen, and where it counts."""
+
+    ahead: float
+    left: float
+    right: float
+    up: float
+    down: float
+    boxes_m: FloatArray = field(default_factory=lambda: np.empty((0, 2, 3)))
+    """(u, 2, 3) lower and upper corners, in the world frame, of boxes of at most half strength, which share no space;
+    none if unknown space is free"""
+
+    @property
+    def shares(self) -> tuple[float, float, float, float, float]:
+        """Shares ahead, left, right, up and down"""
+        return self.ahead, self.left, self.right, self.up, self.down
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,7 +5,7 @@ from scipy.spatial.transform import Rotation
 
 from common.roles import ROLES
 from robot_side.drivers.mujoco.scene import Scene
-from robot_side.surroundings.joined_frames import only
+from robot_side.surroundings.fixed_objects import only
 from robot_side.surroundings.perceived import PerceivedObjects
 from robot_side.viewing.perceived_shapes import PerceivedModel
 

@@ -57,7 +57,7 @@ ARROWS = """
     robot_side/depth/pointing.py: common robot_side/depth robot_side/depth/surfel_map
     robot_side/depth/depth_map.py: common robot_side/depth robot_side/depth/octree robot_side/depth/pointing.py
         robot_side/depth/surfel_map
-    robot_side/depth/perception.py: common robot_side/depth robot_side/depth/depth_map.py
+    robot_side/depth/perception.py: common robot_side/depth robot_side/depth/depth_map.py robot_side/surroundings
     robot_side/gripper: common common/files robot_side/arm robot_side/overlap/meshes robot_side/surroundings
     robot_side/tick: common common/protocol robot_side/arm robot_side/surroundings
     robot_side/commissioning: common common/command common/sockets/door robot_side/arm robot_side/compiled
@@ -77,7 +77,7 @@ ARROWS = """
     robot_side/perceiving: common common/companion common/files common/realtime common/sockets/door robot_side/arm
         robot_side/compiled robot_side/depth robot_side/depth/perception.py robot_side/drivers/mujoco
         robot_side/drivers/mujoco/depth_cameras robot_side/drivers/mujoco/drawing robot_side/drivers/remote
-        robot_side/settings.py robot_side/surroundings robot_side/tick
+        robot_side/settings.py robot_side/surroundings robot_side/surroundings/kinds robot_side/tick
     robot_side/reporting: common common/emulation common/protocol common/rate common/sockets common/sockets/door
         robot_side/arm
         robot_side/operators robot_side/tick

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from robot_side.laws.unknown import HALF
-from robot_side.surroundings.perceived import PerceivedObjects
-from robot_side.surroundings.unknown_space import UnknownSpace
+from robot_side.surroundings.perceived import PerceivedObjects, UnknownSpace
 from tests.helpers.field.fields import RADIUS_M
 from tests.helpers.field.situations import Senses, at, moving, walls
 

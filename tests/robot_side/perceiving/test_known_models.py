@@ -8,7 +8,7 @@ import pytest
 from common.roles import Role
 from robot_side.depth.picture import BOX, SPHERE
 from robot_side.perceiving.known_models import WithModels, solids_of
-from robot_side.surroundings.joined_frames import only
+from robot_side.surroundings.fixed_objects import only
 from robot_side.surroundings.perceived import PerceivedObjects
 from robot_side.surroundings.surroundings import Surroundings
 from tests.helpers.perceived_scenes import Scene

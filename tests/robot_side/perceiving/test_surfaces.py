@@ -30,7 +30,7 @@ from robot_side.perceiving.exchange import (
 from robot_side.perceiving.starting import setup_of
 from robot_side.perceiving.surfaces import OLD_S, Surfaced
 from robot_side.settings import RobotSettings
-from robot_side.surroundings.unknown_space import UnknownSpace
+from robot_side.surroundings.perceived import UnknownSpace
 
 SLOTS = 64
 NEAR = np.zeros(3)

@@ -12,8 +12,7 @@ from common.roles import Role
 from robot_side.arm.port import ArmState
 from robot_side.recording.arm_states import pack_state, unpack_state
 from robot_side.recording.frames import ARRAYS, FramePacker, FrameUnpacker
-from robot_side.surroundings.perceived import PerceivedObjects
-from robot_side.surroundings.unknown_space import UnknownSpace
+from robot_side.surroundings.perceived import PerceivedObjects, UnknownSpace
 
 ANY_FLOAT = st.floats(width=64)
 NAMES = ("table", "target", "post")

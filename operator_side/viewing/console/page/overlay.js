@@ -187,9 +187,10 @@ export class Overlay {
   #showUnseen(shares) {
     this.#unseen.hidden = !shares;
     const said = Object.entries(UNSEEN).map(([side, k]) => [side, Math.round(100 * (shares?.[k] ?? 0))]);
-    const words = `Space that no depth camera has seen: ${said.map(([side, part]) => `${side} ${part} %`).join(", ")}`;
-    if (this.#unseen.title === words) return;
-    this.#unseen.title = words;
+    const shown = said.map(([side, part]) => `${side} ${part} %`).join(", ");
+    if (this.#shown.get("unseen") === shown) return;
+    this.#shown.set("unseen", shown);
+    this.#unseen.title = `Space that no depth camera has seen: ${shown}`;
     for (const [side, part] of said) {
       const place = this.#unseen.querySelector(`.${side}`);
       place.textContent = part;

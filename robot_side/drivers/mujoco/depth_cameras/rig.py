@@ -22,7 +22,7 @@ from robot_side.drivers.mujoco.depth_cameras.rendered import DepthCamera
 from robot_side.drivers.mujoco.drawing.off_screen import choose_late
 from robot_side.drivers.mujoco.encoders import Encoder
 from robot_side.drivers.mujoco.scene import Scene
-from robot_side.surroundings.unknown_space import UnknownSpace
+from robot_side.surroundings.perceived import UnknownSpace
 
 _SOON_S: Final = 1e-9
 _LEAST_NOISE: Final = 0.25

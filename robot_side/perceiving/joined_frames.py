@@ -1,8 +1,5 @@
 """Frames of two sources as one frame, whose movers are those of the first and all objects of the second."""
 
-from collections.abc import Sequence
-from typing import Any
-
 import numpy as np
 
 from common.arrays import FloatArray
@@ -11,21 +8,6 @@ from robot_side.surroundings.kinds.layout import NUMBERS, rows
 from robot_side.surroundings.movers import OF_OBJECTS, Movers
 from robot_side.surroundings.perceived import KINDS, PerceivedObjects
 from robot_side.surroundings.placing import numbers_of, primitives_of
-
-
-def only(frame: PerceivedObjects, which: Sequence[int]) -> PerceivedObjects:
-    """Return a complete frame of some objects, by their indices, in this order; without errors of their own."""
-    keep, new = np.array(which, dtype=np.int64), np.full(len(frame.names), -1)
-    new[keep] = np.arange(len(keep))
-    arrays: dict[str, Any] = {
-        name: None if (values := getattr(frame, name)) is None else values[keep] for name in OF_OBJECTS
-    }
-    for kind in KINDS:
-        owners = new[getattr(frame, kind.owner)]
-        arrays |= {name: getattr(frame, name)[owners >= 0] for name in (*kind.parts, kind.owner)}
-        arrays[kind.owner] = owners[owners >= 0]
-    names, roles = tuple(frame.names[index] for index in which), tuple(frame.roles[index] for index in which)
-    return PerceivedObjects(time_s=frame.time_s, names=names, roles=roles, mesh_library=frame.mesh_library, **arrays)
 
 
 class JoinedFrames:
