@@ -103,10 +103,15 @@ class Unseen(Moment, frozen=True):
     """Share, 0 to 1, of the space on each side of the gripper that no depth camera has seen."""
 
     ahead: float
+    """Share of the space ahead of the gripper, within 0.25 m of the tool"""
     left: float
+    """Share of the space to the left of the gripper"""
     right: float
+    """Share of the space to the right of the gripper"""
     up: float
+    """Share of the space above the gripper"""
     down: float
+    """Share of the space below the gripper"""
 
 
 def by_name(value: Any) -> Any:

@@ -60,6 +60,6 @@ def test_they_stay_until_others_come_and_need_no_new_batch_for_each(drawing: Dra
 
 @pytest.mark.parametrize("surfaces", [None, bytes(39), bytes(80)], ids=["none", "short", "long"])
 def test_surfaces_that_do_not_fit_their_roles_are_refused(surfaces: bytes | None) -> None:
-    version, (*fields, _, _) = msgspec.msgpack.decode(encode(scene_state(HEADER)))
+    version, (*fields, _, _, unseen) = msgspec.msgpack.decode(encode(scene_state(HEADER)))
     with pytest.raises(RemoteProtocolError, match="surfaces has"):
-        decode_view(msgspec.msgpack.encode([version, [*fields, surfaces, bytes(1)]]))
+        decode_view(msgspec.msgpack.encode([version, [*fields, surfaces, bytes(1), unseen]]))
