@@ -82,21 +82,21 @@ class SeenSpace:
 
 def _in_boxes(cells: BoolArray) -> IntArray:
     """Return boxes (u, 2, 3), first indices and those behind the last, which together are the cells (a, b, c)."""
-    left, boxes = cells.copy(), []
-    for low in np.argwhere(cells):
-        if not left[tuple(low)]:
-            continue
-        high = low + 1
-        for axis in (2, 1, 0):
-            while high[axis] < cells.shape[axis]:
-                layer = [slice(*ends) for ends in zip(low, high, strict=True)]
-                layer[axis] = slice(high[axis], high[axis] + 1)
-                if not left[tuple(layer)].all():
-                    break
-                high[axis] += 1
-        left[tuple(slice(*ends) for ends in zip(low, high, strict=True))] = False
-        boxes.append((low, high))
-    return np.array(boxes, dtype=np.int64).reshape(-1, 2, 3)
+    edges = np.diff(np.pad(cells, ((0, 0), (0, 0), (1, 1))).astype(np.int8), axis=2)
+    low, high = np.argwhere(edges > 0), np.argwhere(edges < 0) + np.array([1, 1, 0])
+    for axis in (1, 0):
+        low, high = _joined(low, high, axis)
+    return np.stack([low, high], axis=1)
+
+
+def _joined(low: IntArray, high: IntArray, axis: int) -> tuple[IntArray, IntArray]:
+    """Join boxes (u, 3) that continue each other along an axis."""
+    across = np.delete(np.concatenate([low, high], axis=1), (axis, axis + 3), axis=1)
+    order = np.lexsort((low[:, axis], *across.T))
+    low, high, across = low[order], high[order], across[order]
+    begins = np.ones(len(low), dtype=np.bool_)
+    begins[1:] = (across[1:] != across[:-1]).any(axis=1) | (low[1:, axis] != high[:-1, axis])
+    return low[begins], high[np.roll(begins, -1)]
 
 
 @compiled(PICTURE, input_array(1), input_array(1), input_indices(), array_of(np.uint8, 1))

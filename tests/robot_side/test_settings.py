@@ -7,6 +7,7 @@ import pytest
 
 from common.command.command_line import parse_settings
 from common.roles import Role
+from robot_side.depth.settings import MapSettings
 from robot_side.operators.safety import SafetySettings
 from robot_side.settings import CameraSettings, RobotSettings
 
@@ -61,3 +62,14 @@ def test_a_file_sets_paths_roles_and_whole_numbers(tmp_path: Path) -> None:
     assert settings.prediction_errors == Path("errors.toml")
     assert settings.roles == {"post": Role.IGNORED}
     assert (settings.cameras.width, settings.cameras.height) == (320, 480)
+
+
+def test_sent_objects_may_stand_beside_what_depth_cameras_see_and_half_strength_needs_its_law() -> None:
+    at = "tcp://127.0.0.1:0"
+    assert RobotSettings(objects=at, depth=at).by_depth
+    with pytest.raises(ValueError, match="--perception and --objects exclude each other"):
+        RobotSettings(objects=at, perception="depth")
+    half = MapSettings(unseen="half")
+    assert RobotSettings(depth_map=half).depth_map.unseen == "half"
+    with pytest.raises(ValueError, match=r"--depth-map\.unseen half and --law paper exclude each other"):
+        RobotSettings(depth_map=half, law="paper")
