@@ -43,9 +43,9 @@ _TRUTH_S: Final = 0.01
 _SETTLES_S: Final = 0.3
 MISJUDGES_DEPTH: Final = PersonSettings(aiming="move-and-wait", depth_error_sd_m=0.030, depth_error_mean_m=0.010)
 """Person who sees no obstacle and misjudges distances"""
-
-
-_MOUNT_M = 0.002
+_MOUNT_M: Final = 0.002
+_PICTURES_HZ: Final = 15.0
+"""Half of what the cameras give, as each picture takes a processor 20 ms"""
 
 
 @dataclass(frozen=True)
@@ -116,7 +116,7 @@ class Watch(Listener):
             law_paper_share=trial.paper.share,
             enlargement=trial.paper.enlargement,
             perception=BY_DEPTH if trial.by_depth else None,
-            depth_camera=DepthCameraSettings(mount_error_m=_MOUNT_M),
+            depth_camera=DepthCameraSettings(mount_error_m=_MOUNT_M, rate_hz=_PICTURES_HZ),
         )
         operator = OperatorSettings(
             link=trial.link,

@@ -113,7 +113,8 @@ def cells(settings: HapticsSettings) -> Iterator[Cell]:
                 probability=settings.probability,
                 law=law,
                 paper=settings.paper,
-                by_depth=settings.perception == "depth",
+                # Without haptics nothing is made of what is perceived.
+                by_depth=settings.perception == "depth" and arm != "off",
             ),
         )
 
