@@ -25,6 +25,7 @@ MODULES = {
     "robot": "mujoco numba simplejpeg",
     "operator": "hid hidraw viser trimesh",
     "video": "av",
+    "recorded": "rosbags",
     "record": "foxglove mcap.reader mcap.writer",
     "bench": "mpmath overlap",
     "experiments": "matplotlib pyarrow distributed",

@@ -1,4 +1,4 @@
-"""Clouds in bags of ROS 2, read by `rosbags`: pip install rosbags."""
+"""Clouds in bags of ROS 2, read by `rosbags`."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -27,7 +27,7 @@ def bag_clouds(path: Path, topic: str | None = None) -> Iterator[tuple[float, Cl
         from rosbags.highlevel import AnyReader, AnyReaderError  # noqa: PLC0415  # optional
         from rosbags.typesys import Stores, get_typestore  # noqa: PLC0415
     except ImportError as error:
-        raise ConfigurationError(f"{path}: {error}; valid: with `pip install rosbags`") from error
+        raise ConfigurationError(f"{path}: {error}; valid: with `pip install '.[recorded]'` in the clone") from error
     try:
         with AnyReader([path], default_typestore=get_typestore(Stores.LATEST)) as reader:
             yield from _clouds(reader, path, topic)

@@ -5,14 +5,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from rosbags import rosbag2, typesys
 
 from common.arrays import FloatArray
 from common.errors import ConfigurationError
 from robot_side.depth.recorded.pictures import recorded_pictures
 from tests.robot_side.depth.recorded.test_recorded_pictures import CAMERA, POINTS, organised, require_seen
-
-rosbag2 = pytest.importorskip("rosbags.rosbag2")
-typesys = pytest.importorskip("rosbags.typesys")
 
 
 def cloud(types: dict[str, Any], points_m: FloatArray, stamp_s: float, height: int, order: str) -> Any:
