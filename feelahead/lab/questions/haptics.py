@@ -52,6 +52,8 @@ class HapticsSettings(PaperFlags, Sweep):
     """Number of seeds; each gives one trial for each condition."""
     law: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME|FILE.py...")] = ("swept",)
     """Laws to compare: swept, paper, paper-isotropic, or files of your own (docs/python.md)."""
+    arms: tuple[Arm, ...] = ("mechanical", "reacting")
+    """Conditions beside off: mechanical, in which the person takes no notice of the triggers, and reacting."""
     scenes: tuple[SceneName, ...] = ("wall", "slot", "shelf")
     """Scenes. wall: a wall behind the target. slot: two posts on the way. shelf: a raised edge on the way. table:
     clutter beside the way."""
@@ -72,7 +74,7 @@ class HapticsSettings(PaperFlags, Sweep):
     def __post_init__(self) -> None:
         super().__post_init__()
         require_tried(self.law, "law", tuple(LAWS))
-        for name in ("scenes", "delays"):
+        for name in ("arms", "scenes", "delays"):
             values = getattr(self, name)
             if not values or len(set(values)) < len(values):
                 raise ValueError(
@@ -120,7 +122,8 @@ def cells(settings: HapticsSettings) -> Iterator[Cell]:
 
 
 def _conditions(settings: HapticsSettings) -> list[tuple[Arm, str]]:
-    return [("off", _NO_LAW), *((arm, law) for law in settings.law for arm in _ARMS if arm != "off")]
+    both = [("off", _NO_LAW), *((arm, law) for law in settings.law for arm in _ARMS if arm != "off")]
+    return [(arm, law) for arm, law in both if arm in ("off", *settings.arms)]
 
 
 def run(cell: Cell, seed: int) -> Iterator[Row]:
