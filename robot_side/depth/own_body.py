@@ -6,37 +6,54 @@ from typing import Final
 import numpy as np
 
 from common.arrays import FloatArray, IntArray
-from robot_side.compiled.kernel import FLOAT64, array_of, building_block, compiled, input_array, input_indices
+from robot_side.compiled.kernel import (
+    FLOAT64,
+    array_of,
+    building_block,
+    compiled,
+    input_array,
+    input_indices,
+    output_indices,
+)
 from robot_side.compiled.vectors import Vector, load, norm, subtract
 from robot_side.depth.picture import BOX, CAPSULE, CYLINDER, ELLIPSOID, DepthArray, LabelArray, OwnBody
-from robot_side.depth.view import MASK, PICTURE, pixel_of, ray_at, to_camera, to_world
+from robot_side.depth.view import MASK, PICTURE, pixel_of, pixels_across, ray_at, to_camera, to_world
 
 _GROWN: Final = 2
 """Pixels by which the robot's picture is grown: edges of objects smear"""
+HELD_M: Final = 0.05
+"""Distance from what is known of a held object within which its surface is followed"""
+_STEP: Final = 2.0
+"""Difference of two neighbours' depths, in their distance, up to which a surface goes on: 63 degrees"""
 
 
 def own_pixels(depth_m: DepthArray, view: FloatArray, body: OwnBody, padding_m: float) -> LabelArray:
-    """Return a mask (h, w): 1 where a pixel shows a point within `padding_m` of the body, or is 2 pixels from such."""
+    """Return a mask (h, w): 1 where a pixel shows a point within `padding_m` of the body, or is 2 pixels from such.
+
+    What is held was seen from one side before the grip. So what continues its surface within HELD_M is its own, too.
+    """
     own, grown = np.zeros(depth_m.shape, dtype=np.uint8), np.zeros(depth_m.shape, dtype=np.uint8)
-    _mark(
-        depth_m,
-        view,
-        body.kinds,
-        np.ascontiguousarray(body.positions_m),
-        np.ascontiguousarray(body.rotations),
-        np.ascontiguousarray(body.sizes_m),
-        padding_m,
-        own,
-    )
+    _mark(depth_m, view, *_solids(body), padding_m, own)
+    if body.held:
+        held, carried = np.zeros(depth_m.shape, dtype=np.uint8), body.carried()
+        _mark(depth_m, view, *_solids(carried), padding_m, held)
+        middle_m = carried.positions_m.mean(axis=0)
+        reach_m = np.linalg.norm(carried.positions_m - middle_m, axis=1).max() + carried.sizes_m.max() + HELD_M
+        _follow_surface(depth_m, view, np.array([*middle_m, reach_m]), np.empty(own.size, dtype=np.int64), held)
+        own |= held
     _grow(own, grown)
     return grown
+
+
+def _solids(body: OwnBody) -> tuple[IntArray, FloatArray, FloatArray, FloatArray]:
+    positions_m, rotations, sizes_m = map(np.ascontiguousarray, (body.positions_m, body.rotations, body.sizes_m))
+    return np.ascontiguousarray(body.kinds), positions_m, rotations, sizes_m
 
 
 def within(points_m: FloatArray, body: OwnBody, padding_m: float) -> LabelArray:
     """Return (n,) 1 for the points (n, 3) that are within `padding_m` of the body."""
     found = np.zeros(len(points_m), dtype=np.uint8)
-    solids = (body.kinds, *map(np.ascontiguousarray, (body.positions_m, body.rotations, body.sizes_m)))
-    _find_within(np.ascontiguousarray(points_m), *solids, padding_m, found)
+    _find_within(np.ascontiguousarray(points_m), *_solids(body), padding_m, found)
     return found
 
 
@@ -156,3 +173,33 @@ def _grow(own: LabelArray, grown: LabelArray) -> None:
                 for row in range(max(0, i - _GROWN), min(height, i + _GROWN + 1)):
                     for column in range(max(0, j - _GROWN), min(width, j + _GROWN + 1)):
                         grown[row, column] = 1
+
+
+@compiled(PICTURE, input_array(1), input_array(1), output_indices(), array_of(np.uint8, 2))
+def _follow_surface(
+    depth_m: DepthArray, view: FloatArray, ball: FloatArray, waiting: IntArray, held: LabelArray
+) -> None:
+    """Add to the mask all pixels that continue the surfaces in it, within a ball: middle (3) and radius."""
+    height, width = depth_m.shape
+    count, middle = 0, (ball[0], ball[1], ball[2])
+    for i in range(height):
+        for j in range(width):
+            if held[i, j]:
+                waiting[count] = i * width + j
+                count += 1
+    while count > 0:
+        count -= 1
+        row, column = waiting[count] // width, waiting[count] % width
+        here = depth_m[row, column]
+        for side in range(4):
+            i, j = row + (side == 0) - (side == 1), column + (side == 2) - (side == 3)
+            if i < 0 or j < 0 or i >= height or j >= width or held[i, j] or depth_m[i, j] <= 0.0:
+                continue
+            depth = 1.0 * depth_m[i, j]
+            if abs(depth - here) * pixels_across(view, 1.0, depth) > _STEP:
+                continue
+            across, down = ray_at(view, i, j)
+            if norm(subtract(to_world(view, (across * depth, down * depth, depth)), middle)) <= ball[3]:
+                held[i, j] = 1
+                waiting[count] = i * width + j
+                count += 1

@@ -95,9 +95,19 @@ class OwnBody:
     """(n, 3) sizes: radius; radius and half length; half axes; radius and half length; half sizes"""
     models: int = field(default=0, kw_only=True)
     """Number of solids, the last ones, that are known models: no surface stays near these"""
+    held: int = field(default=0, kw_only=True)
+    """Number of solids, those before the models, that are what the robot holds"""
 
     def known(self) -> "OwnBody":
         """Return the known models alone."""
         first = len(self.kinds) - self.models
-        placed = self.positions_m[first:], self.rotations[first:]
-        return OwnBody(self.kinds[first:], *placed, self.sizes_m[first:], models=self.models)
+        return self._some(slice(first, None), models=self.models)
+
+    def carried(self) -> "OwnBody":
+        """Return what the robot holds alone."""
+        end = len(self.kinds) - self.models
+        return self._some(slice(end - self.held, end), held=self.held)
+
+    def _some(self, rows: slice, *, models: int = 0, held: int = 0) -> "OwnBody":
+        placed = self.positions_m[rows], self.rotations[rows]
+        return OwnBody(self.kinds[rows], *placed, self.sizes_m[rows], models=models, held=held)

@@ -5,7 +5,7 @@ from robot_side.depth.own_body import own_pixels
 from robot_side.depth.picture import OwnBody
 from robot_side.depth.support import normals, supported
 from robot_side.depth.view import view_of
-from tests.robot_side.depth.ray_cast import Box, Camera, looking
+from tests.robot_side.depth.ray_cast import Ball, Box, Camera, looking
 
 CAMERA = Camera(looking((0.0, 0.0, 0.4), (0.6, 0.0, 0.4)), 160, 120)
 VIEW = view_of(CAMERA.pinhole, CAMERA.pose, CAMERA.errors)
@@ -59,3 +59,23 @@ def test_a_body_behind_the_camera_or_around_it_is_no_trouble() -> None:
         np.array([[0.1, 0.0, 0.0], [0.1, 0.1, 0.1]]),
     )
     assert not own_pixels(CAMERA.picture([WALL]).depth_m, VIEW, body, 0.01).any()
+
+
+@pytest.mark.parametrize(("held", "gap_m"), [(0, 0.1), (1, 0.1), (1, 0.0)])
+def test_what_continues_the_surface_of_the_held_object_is_own_and_what_is_behind_its_edge_is_not(
+    held: int, gap_m: float
+) -> None:
+    # Of a ball before a wall, its front alone was known.
+    middle = (0.53 - gap_m, 0.0, 0.4)
+    known = OwnBody(
+        np.array([2]), np.array([[middle[0] - 0.05, 0.0, 0.4]]), np.eye(3)[None], np.full((1, 3), 0.01), held=held
+    )
+    depth_m = CAMERA.picture([WALL, Ball(middle, 0.05)]).depth_m
+    shows_ball = depth_m < CAMERA.picture([WALL]).depth_m - 1e-6
+    own = own_pixels(depth_m, VIEW, known, 0.01) > 0
+    if not held:
+        assert own.sum() < 0.5 * shows_ball.sum()
+    else:
+        assert own[shows_ball].mean() > 0.99
+        # Two pixels around it, as always.
+        assert own.sum() < 1.5 * shows_ball.sum()

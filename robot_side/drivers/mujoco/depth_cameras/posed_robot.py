@@ -76,6 +76,7 @@ class PosedRobot:
             np.concatenate([rotations, np.tile(np.eye(3), (count, 1, 1)), models[:, 4:13].reshape(-1, 3, 3)]),
             np.concatenate([self._sizes_m, np.tile(self.held[:, 3:], (1, 3)), models[:, 13:]]),
             models=len(models),
+            held=count,
         )
 
     def camera(self, link: str, mount: Mount) -> CameraPose:
