@@ -5,11 +5,14 @@ from typing import Final
 
 import numpy as np
 
-from common.arrays import IntArray
+from common.arrays import FloatArray, IntArray
 from common.roles import ROLES, Role
 from robot_side.depth.boxes import Boxes
 from robot_side.depth.free_space import SeenSpace
 from robot_side.depth.grid import Grid
+from robot_side.depth.motion.carrying import Carried
+from robot_side.depth.motion.seer import MotionSeer
+from robot_side.depth.motion.snapshots import snapshot
 from robot_side.depth.octree.planes import Planes
 from robot_side.depth.own_body import own_pixels, within
 from robot_side.depth.picture import CameraPose, DepthErrors, DepthPicture, OwnBody
@@ -55,6 +58,8 @@ class DepthMap:
         self.surfels = SurfelMap(grid)
         self.planes = Planes(grid)
         self.seen = SeenSpace(settings)
+        self.motion = MotionSeer()
+        self._carried = Carried(self.surfels)
 
     def integrate(
         self, picture: DepthPicture, pose: CameraPose, body: OwnBody, errors: DepthErrors, camera: int = 0
@@ -67,7 +72,12 @@ class DepthMap:
         measured = np.ascontiguousarray(picture.depth_m)
         depth_m = supported(measured, view)
         own = own_pixels(depth_m, view, body, self.settings.padding_m)
-        merged = self.surfels.integrate(picture, depth_m, normals(depth_m, view), own, view, camera)
+        facing = normals(depth_m, view)
+        self._carried.move(picture.taken_s, self.motion.movers)
+        merged = self.surfels.integrate(picture, depth_m, facing, own, view, camera)
+        coarse = snapshot(picture, pose, errors, depth_m, facing, own)
+        if (members := self.motion.see(coarse, errors, camera)) is not None:
+            self._carried.mark(coarse, members, self.motion.of_camera(camera))
         if body.models:
             rows = self.surfels.shown
             near = within(self.surfels.table.points_m[rows], body.known(), self.settings.padding_m)
@@ -91,6 +101,10 @@ class DepthMap:
     def boxes(self) -> Boxes:
         """Return the boxes behind all surfaces that have been in two pictures."""
         return self.planes.boxes()
+
+    def velocities_m_s(self, boxes: Boxes) -> FloatArray:
+        """Return the velocity (n, 3) of each of the map's boxes, in the world; exactly 0 for what is not seen to move."""
+        return self._carried.velocities(boxes, self.motion.movers)
 
     def mark(self, box: int, role: Role) -> None:
         """Give a role to the patch of surface at the box of this number, as far as the gripper may grasp it."""

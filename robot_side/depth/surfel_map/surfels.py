@@ -50,7 +50,8 @@ class SurfelMap:
         """(c,) row of each cell's surfel; -1: none"""
         self.dirty = np.zeros(int(grid.blocks.prod()), dtype=np.uint8)
         """(b,) 1 for blocks whose surfels have changed since surfaces were last looked for"""
-        self._counts = np.zeros(len(Count), dtype=np.int64)
+        self.counts = np.zeros(len(Count), dtype=np.int64)
+        """(c,) counts by `Count`"""
         self._taken_s: dict[int, float] = {}
 
     def integrate(
@@ -67,7 +68,7 @@ class SurfelMap:
         for label, role in picture.roles.items():
             roles[label] = ROLES.index(role)
         labels = _NO_LABELS if picture.labels is None else np.ascontiguousarray(picture.labels)
-        place, cells, counts = self.grid.place, self.grid.cells, self._counts
+        place, cells, counts = self.grid.place, self.grid.cells, self.counts
         counts[[Count.MADE, Count.FULL]] = 0
         collect(depth_m, own, labels, roles, normals, view, place, cells, self.slot, self.bundle, counts)
         fold_layers(view, place, cells, self.slot, self.bundle, counts)
@@ -85,16 +86,21 @@ class SurfelMap:
     @property
     def shown(self) -> IntArray:
         """Rows of the surfels that have been in two pictures"""
-        top = int(self._counts[Count.TOP])
+        top = int(self.counts[Count.TOP])
         return np.flatnonzero((self.table.cells[:top] >= 0) & (self.table.shown[:top] > 0))
 
     def forget(self, rows: IntArray) -> None:
         """Remove these surfels (n,)."""
         self.look_again(rows)
-        free, cells = int(self._counts[Count.FREE]), self.table.cells
-        self.slot[cells[rows]], cells[rows] = -1, -1
-        self.table.free[free : free + len(rows)] = rows
-        self._counts[Count.FREE] += len(rows)
+        self.slot[self.table.cells[rows]] = -1
+        self.free(rows)
+
+    def free(self, rows: IntArray) -> None:
+        """Let these surfels (n,) be gone, which hold no cell any more."""
+        count = int(self.counts[Count.FREE])
+        self.table.cells[rows] = -1
+        self.table.free[count : count + len(rows)] = rows
+        self.counts[Count.FREE] += len(rows)
 
     def look_again(self, rows: IntArray) -> None:
         """Let surfaces be looked for again where these surfels (n,) are."""

@@ -1,0 +1,187 @@
+"""How far a region has moved since an earlier picture: point to plane, as far as the surfaces' normals show it."""
+
+import math
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from common.arrays import FloatArray, IntArray
+from robot_side.compiled.kernel import FLOAT64, INT64, compiled, input_array, output_array
+from robot_side.compiled.vectors import dot, subtract
+from robot_side.depth.motion.regions import AROUND, LABELS, Regions
+from robot_side.depth.motion.snapshots import Snapshot, surface_at
+from robot_side.depth.picture import DepthArray, LabelArray
+from robot_side.depth.view import DIRECTIONS, MASK, PICTURE, ray_at, sd_at, to_world, turned_to_world
+
+_CAPS_M: Final = (0.05, 0.03, 0.015, 0.0, 0.0)
+"""Distances from the plane, beyond the errors, up to which a point counts, fit by fit"""
+_SIGMAS: Final = 3.0
+_LEAST_M: Final = 0.001
+_ALIKE: Final = 0.5
+_SEEN: Final = 0.06
+"""Share of the largest eigenvalue below which motion along an eigenvector does not show: sliding along a plane"""
+_SIGNIFICANT: Final = 5.0
+"""Standard deviations from which on motion counts"""
+_AGREEING: Final = 0.6
+"""Share of a region's points that must agree with its motion"""
+_FEWEST: Final = 8
+_CLOSE: Final = 5
+"""Pixels around those that are elsewhere by themselves that belong to what moves"""
+
+
+class Fit(NamedTuple):
+    """Motion of a region."""
+
+    moved_m: FloatArray
+    """(3,) displacement since the earlier picture, in the world; 0 where the surfaces' normals do not show it"""
+    center_m: FloatArray
+    """(3,) mean of its points now"""
+    reach_m: float
+    """Root of the mean square distance from there"""
+    points: float
+    """Number of points that agree"""
+
+
+def fit_motion(
+    newest: Snapshot,
+    before: Snapshot,
+    regions: Regions,
+    region: int,
+    slack: tuple[float, float],
+    pixels_alike: float,
+    start_m: FloatArray,
+) -> Fit | None:
+    """Return how a region has moved; None if it has not significantly, or not as one.
+
+    pixels_alike: number of pixels whose errors are one. start_m (3,): displacement that is expected.
+    """
+    moved_m, sums = np.ascontiguousarray(start_m, dtype=float), np.empty(16)
+    for cap_m in _CAPS_M:
+        _sum(*newest.arrays, *before.arrays, *slack, cap_m, moved_m, regions.labels, region, sums)
+        if sums[9] < _FEWEST:
+            return None
+        a, b, c, d, e, f = sums[:6] / pixels_alike
+        values, vectors = np.linalg.eigh(np.array([[a, d, e], [d, b, f], [e, f, c]]))
+        shown = values > _SEEN * values[-1]
+        along = vectors[:, shown]
+        moved_m = along @ (along.T @ moved_m + along.T @ sums[6:9] / pixels_alike / values[shown])
+    information = float(values[shown] @ (along.T @ moved_m) ** 2)
+    center_m = sums[11:14] / sums[9]
+    seeming_m = slack[0] + slack[1] * float(np.linalg.norm(center_m - newest.pose.position_m))
+    far_m = float(np.linalg.norm(moved_m))
+    agrees = sums[9] >= _AGREEING * sums[10]
+    if not agrees or information < _SIGNIFICANT**2 or far_m <= seeming_m + _LEAST_M:
+        return None
+    reach_m = math.sqrt(max(sums[14] / sums[9] - float(center_m @ center_m), 0.0))
+    return Fit(moved_m, center_m, reach_m, float(sums[9]))
+
+
+def note_members(
+    newest: Snapshot,
+    before: Snapshot,
+    regions: Regions,
+    region: int,
+    slack: tuple[float, float],
+    moved_m: FloatArray,
+    identity: int,
+    members: IntArray,
+) -> None:
+    """Write `identity` into the pixels of `members` (h, w) that have moved with their region."""
+    _note(
+        *(*newest.arrays, *before.arrays, *slack, np.ascontiguousarray(moved_m)),
+        *(regions.labels, regions.spreads, region, identity, members),
+    )
+
+
+_PICTURES: Final = PICTURE, DIRECTIONS, MASK, input_array(1), PICTURE, DIRECTIONS, MASK, input_array(1)
+
+
+@compiled(*_PICTURES, FLOAT64, FLOAT64, FLOAT64, input_array(1), LABELS, INT64, output_array(1))
+def _sum(
+    depth_m: DepthArray,
+    normals: DepthArray,
+    own: LabelArray,
+    view: FloatArray,
+    depth_before_m: DepthArray,
+    normals_before: DepthArray,
+    own_before: LabelArray,
+    view_before: FloatArray,
+    slack_m: float,
+    slack: float,
+    cap_m: float,
+    moved_m: FloatArray,
+    labels: IntArray,
+    region: int,
+    sums: FloatArray,
+) -> None:
+    """Sum the equations of a region's points; own: of no use, as regions have none of the robot's pixels.
+
+    sums: matrix xx, yy, zz, xy, xz, yz; right side (3); points that agree, and all that could; sum of the points (3),
+    and of their squares.
+    """
+    for k in range(sums.size):
+        sums[k] = 0.0
+    by = moved_m[0], moved_m[1], moved_m[2]
+    for i in range(depth_m.shape[0]):
+        for j in range(depth_m.shape[1]):
+            if labels[i, j] != region:
+                continue
+            z, facing = 1.0 * depth_m[i, j], (1.0 * normals[i, j, 0], 1.0 * normals[i, j, 1], 1.0 * normals[i, j, 2])
+            if dot(facing, facing) == 0.0:
+                continue
+            x, y = ray_at(view, i, j)
+            point = to_world(view, (x * z, y * z, z))
+            known, away, variance, normal = surface_at(
+                subtract(point, by), depth_before_m, normals_before, own_before, view_before
+            )
+            if not known:
+                continue
+            sums[10] += 1.0
+            variance += (sd_at(view, z) * dot(facing, (x, y, 1.0))) ** 2 + _LEAST_M**2
+            near = abs(away) <= cap_m + _SIGMAS * math.sqrt(variance) + slack_m + slack * z
+            if not near or dot(turned_to_world(view, facing), normal) < _ALIKE:
+                continue
+            weight = 1.0 / variance
+            for k in range(3):
+                sums[k] += weight * normal[k] * normal[k]
+                sums[6 + k] += weight * normal[k] * away
+                sums[11 + k] += point[k]
+            sums[3] += weight * normal[0] * normal[1]
+            sums[4] += weight * normal[0] * normal[2]
+            sums[5] += weight * normal[1] * normal[2]
+            sums[9] += 1.0
+            sums[14] += dot(point, point)
+
+
+@compiled(*_PICTURES, FLOAT64, FLOAT64, input_array(1), LABELS, LABELS, INT64, INT64, LABELS)
+def _note(
+    depth_m: DepthArray,
+    normals: DepthArray,
+    own: LabelArray,
+    view: FloatArray,
+    depth_before_m: DepthArray,
+    normals_before: DepthArray,
+    own_before: LabelArray,
+    view_before: FloatArray,
+    slack_m: float,
+    slack: float,
+    moved_m: FloatArray,
+    labels: IntArray,
+    spreads: IntArray,
+    region: int,
+    identity: int,
+    members: IntArray,
+) -> None:
+    by = moved_m[0], moved_m[1], moved_m[2]
+    for i in range(depth_m.shape[0]):
+        for j in range(depth_m.shape[1]):
+            if labels[i, j] != region or spreads[i, j] < AROUND - _CLOSE:
+                continue
+            z = 1.0 * depth_m[i, j]
+            x, y = ray_at(view, i, j)
+            point = subtract(to_world(view, (x * z, y * z, z)), by)
+            known, away, variance, _ = surface_at(point, depth_before_m, normals_before, own_before, view_before)
+            variance += sd_at(view, z) ** 2
+            if not known or abs(away) <= _SIGMAS * math.sqrt(variance) + slack_m + slack * z + _LEAST_M:
+                members[i, j] = identity
+

@@ -1,0 +1,146 @@
+"""Regions of a picture that are not where they were in an earlier one."""
+
+import math
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from common.arrays import FloatArray, IntArray
+from robot_side.compiled.kernel import FLOAT64, INT64, array_of, compiled, input_array
+from robot_side.compiled.vectors import dot
+from robot_side.depth.motion.snapshots import Snapshot, surface_at
+from robot_side.depth.picture import DepthArray, LabelArray
+from robot_side.depth.view import DIRECTIONS, MASK, PICTURE, ray_at, sd_at, to_world, turned_to_world
+
+LABELS: Final = array_of(np.int32, 2)
+"""Numba type of the numbers of regions (h, w); 0: none"""
+_SIGMAS: Final = 3.0
+_LEAST_M: Final = 0.001
+_AHEAD: Final = 1
+"""Before what was there: it has come here"""
+_BEHIND: Final = 2
+"""A little behind what was there: it has gone, or was hidden"""
+_BEHIND_M: Final = 0.05
+_ALIKE: Final = 0.5
+"""Least cosine between normals of one surface"""
+AROUND: Final = 5
+"""Pixels around those that have come that belong to their region"""
+_CONTINUOUS: Final = 0.02
+"""Share of the depth by which neighbours of one region may differ, beyond their errors"""
+_FEWEST: Final = 6
+"""Pixels that have come, of the smallest region"""
+_MOST: Final = 64
+"""Largest number of regions"""
+
+
+class Regions(NamedTuple):
+    """Regions that are not where they were."""
+
+    labels: IntArray
+    """(h, w) numbers of the regions, from 1; 0 or -1: none"""
+    spreads: IntArray
+    """(h, w) how many pixels further the region would reach: `AROUND` for those that are elsewhere by themselves"""
+    count: int
+
+
+def moved_regions(newest: Snapshot, before: Snapshot, slack: tuple[float, float]) -> Regions:
+    """Return what is not where it was.
+
+    slack: how far the camera's own motion may seem to move things at no depth, and more for each m of depth.
+    """
+    shape = newest.depth_m.shape
+    kinds, labels, spreads = (np.zeros(shape, dtype) for dtype in (np.uint8, np.int32, np.int32))
+    count = 0
+    if _compare(*newest.arrays, *before.arrays, *slack, kinds) >= _FEWEST:
+        queue = np.empty(labels.size, dtype=np.int32)
+        count = _flood(newest.depth_m, newest.own, newest.view, kinds, labels, spreads, queue)
+    return Regions(labels, spreads, count)
+
+
+@compiled(
+    *(PICTURE, DIRECTIONS, MASK, input_array(1), PICTURE, DIRECTIONS, MASK, input_array(1)),
+    *(FLOAT64, FLOAT64, array_of(np.uint8, 2)),
+    returns=INT64,
+)
+def _compare(
+    depth_m: DepthArray,
+    normals: DepthArray,
+    own: LabelArray,
+    view: FloatArray,
+    depth_before_m: DepthArray,
+    normals_before: DepthArray,
+    own_before: LabelArray,
+    view_before: FloatArray,
+    slack_m: float,
+    slack: float,
+    kinds: LabelArray,
+) -> int:
+    """Write what has become of each pixel's surface; return how many have come."""
+    came = 0
+    for i in range(depth_m.shape[0]):
+        for j in range(depth_m.shape[1]):
+            z, facing = 1.0 * depth_m[i, j], (1.0 * normals[i, j, 0], 1.0 * normals[i, j, 1], 1.0 * normals[i, j, 2])
+            if z <= 0.0 or own[i, j] or dot(facing, facing) == 0.0:
+                continue
+            x, y = ray_at(view, i, j)
+            point = to_world(view, (x * z, y * z, z))
+            known, away, variance, normal = surface_at(point, depth_before_m, normals_before, own_before, view_before)
+            if not known:
+                continue
+            variance += (sd_at(view, z) * dot(facing, (x, y, 1.0))) ** 2
+            if abs(away) <= _SIGMAS * math.sqrt(variance) + slack_m + slack * z + _LEAST_M:
+                continue
+            if away > 0.0:
+                kinds[i, j] = _AHEAD
+                came += 1
+            elif away > -_BEHIND_M and dot(turned_to_world(view, facing), normal) > _ALIKE:
+                kinds[i, j] = _BEHIND
+    return came
+
+
+@compiled(
+    *(PICTURE, MASK, input_array(1), MASK, LABELS, LABELS, array_of(np.int32, 1)),
+    returns=INT64,
+)
+def _flood(
+    depth_m: DepthArray,
+    own: LabelArray,
+    view: FloatArray,
+    kinds: LabelArray,
+    labels: IntArray,
+    spreads: IntArray,
+    queue: IntArray,
+) -> int:
+    """Number the regions; return how many there are. queue: memory."""
+    height, width = depth_m.shape
+    count = 0
+    for start in range(labels.size):
+        if kinds[start // width, start % width] != _AHEAD or labels[start // width, start % width] != 0:
+            continue
+        first, end, came = 0, 1, 0
+        queue[0] = start
+        labels[start // width, start % width] = count + 1
+        spreads[start // width, start % width] = AROUND
+        while first < end:
+            i, j = queue[first] // width, queue[first] % width
+            first += 1
+            came += kinds[i, j] == _AHEAD
+            z = 1.0 * depth_m[i, j]
+            near = _SIGMAS * sd_at(view, z) + _CONTINUOUS * z
+            for way in range(4):
+                row, column = i + (way == 0) - (way == 1), j + (way == 2) - (way == 3)
+                if row < 0 or column < 0 or row >= height or column >= width or labels[row, column] != 0:
+                    continue
+                spread = AROUND if kinds[row, column] != 0 else spreads[i, j] - 1
+                there = depth_m[row, column]
+                if spread < 0 or there <= 0.0 or own[row, column] or abs(there - z) > near:
+                    continue
+                labels[row, column], spreads[row, column] = count + 1, spread
+                queue[end] = row * width + column
+                end += 1
+        if came >= _FEWEST and count + 1 < _MOST:
+            count += 1
+        else:
+            for place in range(end):
+                labels[queue[place] // width, queue[place] % width] = -1
+    return count
