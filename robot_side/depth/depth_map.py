@@ -75,7 +75,7 @@ class DepthMap:
         facing = normals(depth_m, view)
         self._carried.move(picture.taken_s, self.motion.movers)
         merged = self.surfels.integrate(picture, depth_m, facing, own, view, camera)
-        coarse = snapshot(picture, pose, errors, depth_m, facing, own)
+        coarse = snapshot(picture, pose, errors, depth_m, facing, own, self.motion.noise(camera))
         if (members := self.motion.see(coarse, errors, camera)) is not None:
             self._carried.mark(coarse, members, self.motion.of_camera(camera))
         if body.models:

@@ -6,7 +6,7 @@ import numpy as np
 
 from common.arrays import FloatArray
 from robot_side.depth.slots import SlotChanges, Slots
-from robot_side.surroundings.age import since
+from robot_side.surroundings.age import STILL, Since, since
 from robot_side.surroundings.perceived import PerceivedObjects, UnknownSpace
 
 
@@ -23,7 +23,8 @@ class SurfaceFrames:
         self._slots, self._camera_sd_m, self._unseen_m_s = Slots(slots, fixed), camera_sd_m, unseen_m_s
         self._taken_s = (math.inf, math.inf)
         self._frame = self._slots.frame(0.0, self._sds_m())
-        self._unseen_m = 0.0
+        self._shown: Since | None = STILL
+        """What was known when the frame was made; None: something has changed"""
         self._unknown: UnknownSpace | None = None
 
     def take(self, changes: SlotChanges, taken_s: tuple[float, float], unknown: UnknownSpace | None = None) -> None:
@@ -32,14 +33,15 @@ class SurfaceFrames:
         taken_s: earliest and latest time of the newest picture.
         """
         self._slots.apply(changes)
-        self._taken_s, self._unseen_m, self._unknown = taken_s, math.nan, unknown
+        self._taken_s, self._shown, self._unknown = taken_s, None, unknown
 
     def at(self, now_s: float) -> PerceivedObjects:
         """Return the frame at `now_s`: the same object until something in it has changed."""
-        unseen_m = since(self._taken_s, now_s, self._unseen_m_s).unseen_m
-        if unseen_m != self._unseen_m:
-            self._unseen_m = unseen_m
-            self._frame = self._slots.frame(self._taken_s[0], self._sds_m(), unseen_m, self._unknown)
+        known, shown = since(self._taken_s, now_s, self._unseen_m_s), self._shown
+        moves = self._slots.moves
+        if shown is None or known.unseen_m != shown.unseen_m or (moves and known.is_later(shown)):
+            self._shown = known
+            self._frame = self._slots.frame(self._taken_s[0], self._sds_m(), known, self._unknown)
         return self._frame
 
     def _sds_m(self) -> FloatArray:

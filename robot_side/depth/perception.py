@@ -37,7 +37,8 @@ class DepthPerception:
 
         holds: whether the gripper holds something.
         """
-        return self._slots.update(self._map.boxes(), near_m, self._errors, holds=holds)
+        boxes = self._map.boxes()
+        return self._slots.update(boxes, near_m, self._errors, self._map.velocities_m_s(boxes), holds=holds)
 
     def whole(self) -> SlotChanges:
         """Return all surfaces as changes, for a process that has missed some."""

@@ -16,6 +16,7 @@ from robot_side.depth.boxes import Boxes
 from robot_side.depth.picture import DepthErrors
 from robot_side.depth.surface_errors import surface_sds
 from robot_side.depth.together import largest_piece, planes_of
+from robot_side.surroundings.age import STILL, Since
 from robot_side.surroundings.fixed_objects import joined
 from robot_side.surroundings.kinds.layout import NUMBERS
 from robot_side.surroundings.movers import Movers
@@ -31,6 +32,8 @@ PIECES: Final = 96
 """Number of boxes of which the target consists at most"""
 _TARGET, _IGNORED = ROLES.index(Role.TARGET), ROLES.index(Role.IGNORED)
 _SIZES: Final = slice(12, 15)
+_VELOCITIES: Final = slice(12, 15)
+"""Columns of a box's half sizes, and of an object's velocity"""
 BOX_NUMBERS: Final = 15
 """Centre (3), rotation by rows (9) and half sizes (3)"""
 
@@ -47,6 +50,8 @@ class SlotChanges:
     """(c,) indices in ROLES"""
     sds_m: FloatArray
     """(c,) standard deviation of the surface's place by its pixels' errors; 0 for unused slots"""
+    velocities_m_s: FloatArray
+    """(c, 3) velocity of the box in the world; that of the whole target for each of its pieces"""
     planes: IntArray
     """(c,) number of the plane of which the box is a piece: that of its first object; -1 for a box that stands alone"""
     crowded_out: int
@@ -61,6 +66,7 @@ class Slots:
         none, rows = np.empty(0, dtype=np.int64), PIECES + count
         self._numbers, self._roles, self.sds_m = _unused(rows)
         """(n,) standard deviation of each slot's place by its pixels' errors; 0 for unused slots"""
+        self._velocities_m_s: FloatArray = np.zeros((rows, 3))
         self._ids: IntArray = np.full(rows, -1)
         self._planes: IntArray = np.full(rows, -1)
         self._barred: BoolArray = np.zeros(rows, dtype=np.bool_)
@@ -107,11 +113,17 @@ class Slots:
         return int(held[0]) if held.size else None
 
     def update(
-        self, boxes: Boxes, near_m: FloatArray, errors: DepthErrors = EXACT, *, holds: bool = False
+        self,
+        boxes: Boxes,
+        near_m: FloatArray,
+        errors: DepthErrors = EXACT,
+        velocities_m_s: FloatArray | None = None,
+        *,
+        holds: bool = False,
     ) -> SlotChanges:
         """Give each box a slot, which it keeps as long as it is there, and return what changed.
 
-        errors: of the cameras. holds: whether the gripper holds something. Slots that become free meanwhile stay free:
+        errors: of the cameras. velocities_m_s (n, 3): of the boxes; None: all are at rest. holds: whether the gripper holds something. Slots that become free meanwhile stay free:
         one may be that of the held object, and nobody would feel another box in it.
 
         near_m (3,): the gripper's place; if there are too many boxes, those nearest to it get slots. A box without a
@@ -124,7 +136,8 @@ class Slots:
         of_planes = planes_of(boxes)
         of_pixels_m = surface_sds(boxes, of_planes, errors)
         numbers, roles, sds_m = _unused(len(self._ids))
-        planes: IntArray = np.full(len(self._ids), -1)
+        of_boxes_m_s = np.zeros((len(boxes.ids), 3)) if velocities_m_s is None else velocities_m_s
+        moving_m_s, planes = np.zeros((len(self._ids), 3)), np.full(len(self._ids), -1)
         left: IntArray = np.empty(0, dtype=np.int64)
         for rows, of_group in zip((slice(0, PIECES), slice(PIECES, None)), groups, strict=True):
             ids, barred = self._ids[rows], self._barred[rows]
@@ -143,18 +156,27 @@ class Slots:
             given = boxes.roles[of]
             is_none = (given < 0) | ((rows.start == PIECES) & (given == _TARGET))
             roles[rows][used] = np.where(is_none, roles[rows][used], given)
-            sds_m[rows][used] = of_pixels_m[of]
+            sds_m[rows][used], moving_m_s[rows][used] = of_pixels_m[of], of_boxes_m_s[of]
             if rows.stop is None:
                 planes[rows][used] = _by_first(of_planes[of], self._objects[rows][used])
-        _fill_pieces(numbers[:PIECES], self._ids[:PIECES] >= 0)
+        pieces = self._ids[:PIECES] >= 0
+        _fill_pieces(numbers[:PIECES], pieces)
+        # The target moves as one, if most of it does.
+        most = np.median(moving_m_s[:PIECES][pieces], axis=0) if pieces.any() else np.zeros(3)
+        moving_m_s[:PIECES] = most
         same = (numbers == self._numbers).all(axis=1) & (roles == self._roles) & (sds_m == self.sds_m)
-        changed = np.flatnonzero(~same | (planes != self._planes))
+        changed = np.flatnonzero(~same | (planes != self._planes) | (moving_m_s != self._velocities_m_s).any(axis=1))
         self._numbers, self._roles, self.sds_m, self._planes = numbers, roles, sds_m, planes
-        return SlotChanges(changed, numbers[changed], roles[changed], sds_m[changed], planes[changed], len(left))
+        self._velocities_m_s = moving_m_s
+        return self._changes(changed, len(left))
 
     def whole(self) -> SlotChanges:
         """Return all slots as changes, for a process that has just started."""
-        return SlotChanges(np.arange(len(self._ids)), self._numbers, self._roles, self.sds_m, self._planes, 0)
+        return self._changes(np.arange(len(self._ids)), 0)
+
+    def _changes(self, slots: IntArray, crowded_out: int) -> SlotChanges:
+        columns = self._numbers, self._roles, self.sds_m, self._velocities_m_s, self._planes
+        return SlotChanges(slots, *(column[slots] for column in columns), crowded_out)
 
     def apply(self, changes: SlotChanges) -> None:
         """Take over these changes.
@@ -168,11 +190,15 @@ class Slots:
             raise ValueError(f"roles = {changes.roles.min()} to {changes.roles.max()}; valid: 0 to {len(ROLES) - 1}")
         if changes.numbers.shape != (len(slots), BOX_NUMBERS):
             raise ValueError(f"numbers has the shape {changes.numbers.shape}; valid: {(len(slots), BOX_NUMBERS)}")
+        if changes.velocities_m_s.shape != (len(slots), 3):
+            raise ValueError(f"velocities_m_s has the shape {changes.velocities_m_s.shape}; valid: {(len(slots), 3)}")
         require_finite("numbers", changes.numbers)
+        require_finite("velocities_m_s", changes.velocities_m_s)
         if changes.planes.size and not -1 <= changes.planes.min() <= changes.planes.max() <= self._objects[-1]:
             valid = f"valid: -1 to {self._objects[-1]}"
             raise ValueError(f"planes = {changes.planes.min()} to {changes.planes.max()}; {valid}")
         self._numbers[slots], self.sds_m[slots], self._planes[slots] = changes.numbers, changes.sds_m, changes.planes
+        self._velocities_m_s[slots] = changes.velocities_m_s
         if (self._roles[slots] != changes.roles).any():
             self._roles[slots] = changes.roles
             of_target = Role.TARGET if (self._roles[:PIECES] == _TARGET).any() else Role.OBSTACLE
@@ -181,22 +207,40 @@ class Slots:
         self._frame_numbers = self._frame_numbers.copy()
         self._write(slots)
 
+    @property
+    def moves(self) -> bool:
+        """Whether anything moves"""
+        return bool(self._velocities_m_s.any())
+
     def frame(
-        self, time_s: float, of_slots_m: FloatArray, unseen_m: float = 0.0, unknown: UnknownSpace | None = None
+        self, time_s: float, of_slots_m: FloatArray, known: Since = STILL, unknown: UnknownSpace | None = None
     ) -> PerceivedObjects:
-        """Return the frame of all changes so far. of_slots_m (n,): σ_c of each slot. Others: as in a frame."""
+        """Return the frame of all changes so far. of_slots_m (n,): σ_c of each slot.
+
+        known: what is known of the motion since the pictures; what moves is carried on by its velocity. unknown: as in
+        a frame.
+        """
         fixed = len(self._fixed_roles)
         sds_m = np.concatenate([[of_slots_m[:PIECES].max()], of_slots_m[PIECES:], np.zeros(fixed)])
         # The target is an object by itself.
         surfaces = np.concatenate([[-1], self._planes[PIECES:], np.full(fixed, -1)])
+        numbers, late_s = self._frame_numbers, 0.0
+        if self.moves:
+            moving = np.flatnonzero(self._velocities_m_s.any(axis=1))
+            own = moving[(moving == 0) | (moving >= PIECES)]
+            numbers, late_s = numbers.copy(), known.late_s
+            for rows, of in ((moving, moving), (len(self._ids) + self._objects[own], own)):
+                numbers[rows, :3] += known.carried_s * self._velocities_m_s[of]
         roles = self._frame_roles + self._fixed_roles
-        return self._movers.frame(time_s, self._frame_numbers, roles, unseen_m, 0.0, sds_m, surfaces, unknown)
+        return self._movers.frame(time_s, numbers, roles, known.unseen_m, late_s, sds_m, surfaces, unknown)
 
     def _write(self, slots: IntArray) -> None:
         self._frame_numbers[slots, :BOX_NUMBERS] = self._numbers[slots]
         # An object's own frame is that of its first box.
         own = slots[(slots == 0) | (slots >= PIECES)]
-        self._frame_numbers[len(self._ids) + self._objects[own], : _SIZES.start] = self._numbers[own, : _SIZES.start]
+        rows = len(self._ids) + self._objects[own]
+        self._frame_numbers[rows, : _SIZES.start] = self._numbers[own, : _SIZES.start]
+        self._frame_numbers[rows, _VELOCITIES] = self._velocities_m_s[own]
 
 
 def _assign(held: IntArray, ids: IntArray, barred: BoolArray, *, holds: bool) -> None:

@@ -86,6 +86,7 @@ class Surfaces(msgspec.Struct, frozen=True, tag=True):
     numbers: bytes
     roles: bytes
     sds_m: bytes
+    velocities_m_s: bytes
     planes: bytes
     crowded_out: int
     seen: dict[str, float]
@@ -105,6 +106,7 @@ def surfaces(
         numbers=changes.numbers.tobytes(),
         roles=changes.roles.tobytes(),
         sds_m=changes.sds_m.tobytes(),
+        velocities_m_s=changes.velocities_m_s.tobytes(),
         planes=changes.planes.tobytes(),
         crowded_out=changes.crowded_out,
         seen=seen,
@@ -120,6 +122,7 @@ def changes_of(message: Surfaces) -> SlotChanges:
         np.frombuffer(message.numbers).reshape(-1, BOX_NUMBERS),
         np.frombuffer(message.roles, dtype=np.int64),
         np.frombuffer(message.sds_m),
+        np.frombuffer(message.velocities_m_s).reshape(-1, 3),
         np.frombuffer(message.planes, dtype=np.int64),
         message.crowded_out,
     )

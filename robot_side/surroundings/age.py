@@ -7,6 +7,8 @@ MOST_CARRIED_S: Final = 0.5
 """Longest time for which an object is carried on by its velocity"""
 MOST_GROWN_S: Final = 5.0
 """Age from which on what is not known of an object's motion grows no more"""
+_CARRIED_PERIOD_S: Final = 0.008
+"""Period in which moving objects are carried on"""
 _STEP_M: Final = 0.0005
 """Steps in which the distance that objects may have moved unseen is rounded up"""
 
@@ -20,6 +22,14 @@ class Since(NamedTuple):
     """Time by which they may be ahead of or behind that"""
     unseen_m: float
     """Distance by which any object may have moved in a way that the sender has not seen"""
+
+    def is_later(self, than: "Since") -> bool:
+        """Return whether moving objects have to be carried on: looks are made no more often."""
+        return abs(self.carried_s + self.late_s - than.carried_s - than.late_s) >= _CARRIED_PERIOD_S
+
+
+STILL: Final = Since(0.0, 0.0, 0.0)
+"""Of a picture that was taken now"""
 
 
 def since(taken_s: tuple[float, float], now_s: float, unseen_m_s: float) -> Since:

@@ -5,14 +5,13 @@ from collections.abc import Callable
 from typing import Final
 
 from common.arrays import FloatArray
-from feelahead.lab.approaches.placements import shifted
 from feelahead.lab.approaches.replay import Replay
 from robot_side.depth.frames import SurfaceFrames
 from robot_side.drivers.mujoco.depth_cameras.rig import DepthRig
 from robot_side.drivers.mujoco.posed_scene import PosedScene
 from robot_side.surroundings.perceived import PerceivedObjects
 
-_REMEMBERED: Final = 30
+_REMEMBERED: Final = 100
 _BEFORE_S: Final = 0.5
 """Time for which the cameras see the scene before the pull begins"""
 
@@ -30,7 +29,7 @@ class RecordedDepth:
         frames: Callable[[], SurfaceFrames],
         seed: int,
     ) -> None:
-        """shift_m (3,), speed_m_s: of the objects, as in `shifted`. frames: makes empty frames.
+        """shift_m (3,), speed_m_s: of the objects, as in `shifted`, but before the pull, too. frames: makes empty frames.
 
         seed: draws the cameras' errors.
         """
@@ -41,7 +40,7 @@ class RecordedDepth:
         self._new_frames = frames
         self._frames, self._taken = frames(), 0
         self._shown: deque[tuple[float, PerceivedObjects]] = deque(maxlen=_REMEMBERED)
-        """Newest frames, and when each became known"""
+        """Newest frames, and the time of each"""
         self._rig.restart(seed)
 
     def at(self, time_s: float) -> PerceivedObjects:
@@ -52,7 +51,8 @@ class RecordedDepth:
             self._shown.clear()
         record, rig = self._replay.record, self._rig
         while (due_s := self._first_s + self._taken * self._period_s) + rig.latency_s <= time_s:
-            shift_m = shifted(self._shift_m, self._replay, self._speed_m_s, due_s)
+            # What comes is coming already when the cameras begin to look.
+            shift_m = self._shift_m + self._speed_m_s * (due_s - record.began_s) * self._replay.axis
             fingers = record.finger_positions[record.pose_row(due_s)]
             self._posed.set_pose(self._replay.joints_at(due_s)[0], fingers, shift_m)
             rig.take(self._posed.data, due_s, self._roles)
@@ -63,4 +63,10 @@ class RecordedDepth:
             self._shown.append((known_s, self._frames.at(known_s)))
             self._taken += 1
         earlier = [frame for shown_s, frame in self._shown if shown_s <= time_s]
-        return earlier[-1] if earlier else self._frames.at(time_s)
+        if not earlier or time_s > self._shown[-1][0]:
+            # What moves is carried on between pictures.
+            frame = self._frames.at(time_s)
+            if not self._shown or frame is not self._shown[-1][1]:
+                self._shown.append((time_s, frame))
+            return frame
+        return earlier[-1]

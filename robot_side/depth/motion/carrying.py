@@ -141,6 +141,11 @@ def _mark(
         if i < 0 or j < 0 or i >= depth_m.shape[0] or j >= depth_m.shape[1]:
             continue
         if members[i, j] > 0:
+            if movers[row] == 0:
+                # The means of earlier pictures are of where it was.
+                for k in range(3):
+                    surfels.points_m[row, k] = point[k]
+                dirty[block_of(all_cells, surfels.cells[row])] = 1
             movers[row], cells[row] = members[i, j], surfels.cells[row]
             # What moves is shown at once.
             if not surfels.shown[row]:

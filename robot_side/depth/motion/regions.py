@@ -14,8 +14,11 @@ from robot_side.depth.view import DIRECTIONS, MASK, PICTURE, ray_at, sd_at, to_w
 
 LABELS: Final = array_of(np.int32, 2)
 """Numba type of the numbers of regions (h, w); 0: none"""
-_SIGMAS: Final = 3.0
-_LEAST_M: Final = 0.001
+_SIGMAS: Final = 2.0
+"""Standard deviations from which on a pixel may be elsewhere; many together show it"""
+_LEAST_M: Final = 0.0005
+_TOGETHER: Final = 20.0
+"""Least sum of the squares of a region's deviations, in variances of what errs as one"""
 _AHEAD: Final = 1
 """Before what was there: it has come here"""
 _BEHIND: Final = 2
@@ -27,6 +30,9 @@ AROUND: Final = 5
 """Pixels around those that have come that belong to their region"""
 _CONTINUOUS: Final = 0.02
 """Share of the depth by which neighbours of one region may differ, beyond their errors"""
+_MOST_SQUARE: Final = 25.0
+_MEAN: Final = 0.92
+"""Mean of the squares of normal numbers, none above 2²"""
 _FEWEST: Final = 6
 """Pixels that have come, of the smallest region"""
 _MOST: Final = 64
@@ -41,26 +47,28 @@ class Regions(NamedTuple):
     spreads: IntArray
     """(h, w) how many pixels further the region would reach: `AROUND` for those that are elsewhere by themselves"""
     count: int
+    noise: float
+    """Variance of what stands still, as a share of that by the camera's errors"""
 
 
-def moved_regions(newest: Snapshot, before: Snapshot, slack: tuple[float, float]) -> Regions:
-    """Return what is not where it was.
+def moved_regions(newest: Snapshot, before: Snapshot, slack: tuple[float, float], pixels_alike: float) -> Regions:
+    """Return what is not where it was. pixels_alike: number of pixels whose errors are one.
 
     slack: how far the camera's own motion may seem to move things at no depth, and more for each m of depth.
     """
     shape = newest.depth_m.shape
     kinds, labels, spreads = (np.zeros(shape, dtype) for dtype in (np.uint8, np.int32, np.int32))
-    count = 0
-    if _compare(*newest.arrays, *before.arrays, *slack, kinds) >= _FEWEST:
-        queue = np.empty(labels.size, dtype=np.int32)
-        count = _flood(newest.depth_m, newest.own, newest.view, kinds, labels, spreads, queue)
-    return Regions(labels, spreads, count)
+    queue, squares = np.empty(labels.size, dtype=np.int32), np.empty(shape, dtype=np.float32)
+    noise = _compare(*newest.arrays, *before.arrays, *slack, kinds, squares)
+    least = _TOGETHER * pixels_alike
+    count = _flood(newest.depth_m, newest.own, newest.view, kinds, squares, least, labels, spreads, queue)
+    return Regions(labels, spreads, count, noise)
 
 
 @compiled(
     *(PICTURE, DIRECTIONS, MASK, input_array(1), PICTURE, DIRECTIONS, MASK, input_array(1)),
-    *(FLOAT64, FLOAT64, array_of(np.uint8, 2)),
-    returns=INT64,
+    *(FLOAT64, FLOAT64, array_of(np.uint8, 2), array_of(np.float32, 2)),
+    returns=FLOAT64,
 )
 def _compare(
     depth_m: DepthArray,
@@ -74,9 +82,13 @@ def _compare(
     slack_m: float,
     slack: float,
     kinds: LabelArray,
-) -> int:
-    """Write what has become of each pixel's surface; return how many have come."""
-    came = 0
+    squares: DepthArray,
+) -> float:
+    """Write what has become of each pixel's surface, and the square of its deviation over the variance.
+
+    Return the mean of these squares, but for what moves, against that of the errors.
+    """
+    total, count = 0.0, 0
     for i in range(depth_m.shape[0]):
         for j in range(depth_m.shape[1]):
             z, facing = 1.0 * depth_m[i, j], (1.0 * normals[i, j, 0], 1.0 * normals[i, j, 1], 1.0 * normals[i, j, 2])
@@ -88,18 +100,20 @@ def _compare(
             if not known:
                 continue
             variance += (sd_at(view, z) * dot(facing, (x, y, 1.0))) ** 2
-            if abs(away) <= _SIGMAS * math.sqrt(variance) + slack_m + slack * z + _LEAST_M:
+            total += min(away * away / variance, _SIGMAS * _SIGMAS)
+            count += 1
+            beyond = abs(away) - slack_m - slack * z - _LEAST_M
+            if beyond <= _SIGMAS * math.sqrt(variance):
                 continue
             if away > 0.0:
-                kinds[i, j] = _AHEAD
-                came += 1
+                kinds[i, j], squares[i, j] = _AHEAD, min(beyond * beyond / variance, _MOST_SQUARE)
             elif away > -_BEHIND_M and dot(turned_to_world(view, facing), normal) > _ALIKE:
                 kinds[i, j] = _BEHIND
-    return came
+    return total / (_MEAN * count) if count > 0 else 1.0
 
 
 @compiled(
-    *(PICTURE, MASK, input_array(1), MASK, LABELS, LABELS, array_of(np.int32, 1)),
+    *(PICTURE, MASK, input_array(1), MASK, PICTURE, FLOAT64, LABELS, LABELS, array_of(np.int32, 1)),
     returns=INT64,
 )
 def _flood(
@@ -107,6 +121,8 @@ def _flood(
     own: LabelArray,
     view: FloatArray,
     kinds: LabelArray,
+    squares: DepthArray,
+    least: float,
     labels: IntArray,
     spreads: IntArray,
     queue: IntArray,
@@ -117,16 +133,18 @@ def _flood(
     for start in range(labels.size):
         if kinds[start // width, start % width] != _AHEAD or labels[start // width, start % width] != 0:
             continue
-        first, end, came = 0, 1, 0
+        first, end, came, square = 0, 1, 0, 0.0
         queue[0] = start
         labels[start // width, start % width] = count + 1
         spreads[start // width, start % width] = AROUND
         while first < end:
             i, j = queue[first] // width, queue[first] % width
             first += 1
-            came += kinds[i, j] == _AHEAD
+            if kinds[i, j] == _AHEAD:
+                came += 1
+                square += squares[i, j]
             z = 1.0 * depth_m[i, j]
-            near = _SIGMAS * sd_at(view, z) + _CONTINUOUS * z
+            near = 3.0 * sd_at(view, z) + _CONTINUOUS * z
             for way in range(4):
                 row, column = i + (way == 0) - (way == 1), j + (way == 2) - (way == 3)
                 if row < 0 or column < 0 or row >= height or column >= width or labels[row, column] != 0:
@@ -138,7 +156,7 @@ def _flood(
                 labels[row, column], spreads[row, column] = count + 1, spread
                 queue[end] = row * width + column
                 end += 1
-        if came >= _FEWEST and count + 1 < _MOST:
+        if came >= _FEWEST and square >= least and count + 1 < _MOST:
             count += 1
         else:
             for place in range(end):

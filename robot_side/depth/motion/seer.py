@@ -2,6 +2,7 @@
 
 import itertools
 import math
+from collections import defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final
@@ -18,12 +19,14 @@ _AGES_S: Final = (0.3, 0.2, 0.1)
 """Ages of earlier pictures to compare with: the slower, the older"""
 _STEP_M: Final = 0.02
 """Displacement at which what is known to move is compared with its earlier picture"""
-_CONFIRMED: Final = 3
+_CONFIRMED: Final = 2
 """Pictures after which motion counts"""
 _UNSEEN_S: Final = 0.25
 """Time without a picture that shows motion after which it has ended"""
 _NEWER: Final = 0.5
 """Share of the newest picture in a velocity"""
+_FASTER: Final = 1.25
+"""Factor from which on a speed is taken for a new one: what has just begun to move was at rest for part of the time"""
 _NEAR_M: Final = 0.04
 _ALIKE: Final = 0.6
 """How far, beyond its own reach, a thing may be found from where it is expected, and by which share of its speed its
@@ -57,14 +60,14 @@ class Mover:
         there_m = self.center_m + (now_s - self.seen_s) * self.velocity_m_s
         apart_m_s = float(np.linalg.norm(velocity_m_s - self.velocity_m_s))
         near = float(np.linalg.norm(fit.center_m - there_m)) <= self.reach_m + fit.reach_m + _NEAR_M
-        return near and apart_m_s <= _SLOW_M_S + _ALIKE * float(np.linalg.norm(self.velocity_m_s))
+        return near and apart_m_s <= _SLOW_M_S + _ALIKE * max(float(np.linalg.norm(one)) for one in (velocity_m_s, self.velocity_m_s))
 
 
 class MotionSeer:
     """Finds what moves."""
 
     def __init__(self) -> None:
-        self._earlier: dict[int, Earlier] = {}
+        self._earlier: defaultdict[int, Earlier] = defaultdict(Earlier)
         self._numbers = itertools.count(1)
         self.movers: dict[int, Mover] = {}
         """All that moves, by identity"""
@@ -73,20 +76,25 @@ class MotionSeer:
         """Return the identities (n,) of what moves in a camera's pictures."""
         return np.array([one for one in self.movers if one % _OF_CAMERA == camera], dtype=np.int64)
 
+    def noise(self, camera: int) -> float:
+        """Return the factor on the variance of a camera's errors by which standing things differ in its pictures."""
+        return self._earlier[camera].noise
+
     def see(self, newest: Snapshot, errors: DepthErrors, camera: int) -> IntArray | None:
         """Return the identity of the mover that each pixel (h, w) shows, 0 for none; None if nothing moves.
 
         camera: number of the one that took it.
         """
         now_s, movers = newest.taken_s, self.movers
-        earlier = self._earlier.setdefault(camera, Earlier())
+        earlier = self._earlier[camera]
         pixels_alike = max(1.0, (2.0 * errors.correlation * float(newest.view[0])) ** 2)
         mine = set(self.of_camera(camera).tolist())
         members = np.zeros(newest.depth_m.shape, dtype=np.int32)
         found: set[int] = set()
         for before in _to_compare(earlier, newest, [movers[one] for one in mine]):
             since_s, slack = now_s - before.taken_s, _seeming(newest, before)
-            regions = moved_regions(newest, before, slack)
+            regions = moved_regions(newest, before, slack, pixels_alike)
+            earlier.measure(regions.noise)
             for region in range(1, regions.count + 1):
                 expected = [since_s * movers[one].velocity_m_s for one in mine] + [np.zeros(3)]
                 tries = (fit_motion(newest, before, regions, region, slack, pixels_alike, one) for one in expected)
@@ -94,6 +102,16 @@ class MotionSeer:
                 if fit is None:
                     continue
                 velocity_m_s = fit.moved_m / since_s
+                later = earlier.of_age(now_s, 0.5 * since_s, newest)
+                if later is not None and later is not before:
+                    lately_s = now_s - later.taken_s
+                    start_m = lately_s * velocity_m_s
+                    sooner = fit_motion(
+                        newest, later, regions, region, _seeming(newest, later), pixels_alike, start_m
+                    )
+                    faster = _FASTER * float(np.linalg.norm(velocity_m_s))
+                    if sooner is not None and float(np.linalg.norm(sooner.moved_m)) > faster * lately_s:
+                        velocity_m_s = sooner.moved_m / lately_s
                 identity = self._update(fit, velocity_m_s, now_s, mine, found, camera)
                 if movers[identity].counts:
                     note_members(newest, before, regions, region, slack, fit.moved_m, identity, members)
@@ -113,7 +131,9 @@ class MotionSeer:
             mover = self.movers[identity]
             if mover.is_at(fit, velocity_m_s, now_s):
                 if identity not in found:
-                    mover.velocity_m_s = mover.velocity_m_s + _NEWER * (velocity_m_s - mover.velocity_m_s)
+                    faster = np.linalg.norm(velocity_m_s) > _FASTER * np.linalg.norm(mover.velocity_m_s)
+                    share = 1.0 if faster else _NEWER
+                    mover.velocity_m_s = mover.velocity_m_s + share * (velocity_m_s - mover.velocity_m_s)
                     mover.center_m, mover.reach_m, mover.seen_s = fit.center_m, fit.reach_m, now_s
                     mover.pictures += 1
                     found.add(identity)

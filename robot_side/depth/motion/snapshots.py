@@ -1,6 +1,8 @@
 """Coarser pictures, as motion is looked for in, and the earlier one that a newer one is compared with."""
 
+import math
 from collections import deque
+from dataclasses import replace
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -16,6 +18,10 @@ _WIDTH: Final = 160
 _APART_S: Final = 0.055
 _OLDEST_S: Final = 0.4
 """Ages between earlier pictures, and of the oldest one that is kept"""
+_LEAST: Final = 0.25
+_FALLS: Final = 0.8
+_RISES: Final = 1.05
+"""Least noise, and by which factors it follows one picture: what moves looks like noise, too"""
 
 
 class Snapshot(NamedTuple):
@@ -45,15 +51,18 @@ def snapshot(
     depth_m: DepthArray,
     normals: DepthArray,
     own: LabelArray,
+    noise: float,
 ) -> Snapshot:
-    """Return a picture's coarser one. depth_m, normals, own: of all its pixels."""
+    """Return a picture's coarser one. depth_m, normals, own: of all its pixels. noise: factor on the variance."""
     step = max(round(depth_m.shape[1] / _WIDTH), 1)
     fine, every = picture.pinhole, (slice(None, None, step),) * 2
     # The middle of each pixel that is kept stays where it is.
     middle = 0.5 - 0.5 / step
     coarse = Pinhole(fine.fx / step, fine.fy / step, fine.cx / step + middle, fine.cy / step + middle)
     kept = (np.ascontiguousarray(one[every]) for one in (depth_m, normals, own))
-    return Snapshot(picture.taken_s, pose, *kept, view_of(coarse, pose, errors))
+    by = math.sqrt(noise)
+    scaled = replace(errors, growth_per_m=by * errors.growth_per_m, floor_m=by * errors.floor_m)
+    return Snapshot(picture.taken_s, pose, *kept, view_of(coarse, pose, scaled))
 
 
 class Earlier:
@@ -61,6 +70,12 @@ class Earlier:
 
     def __init__(self) -> None:
         self._kept: deque[Snapshot] = deque()
+        self.noise = 1.0
+        """Variance of what stands still, as a share of that by the camera's errors: part of an error never changes"""
+
+    def measure(self, share: float) -> None:
+        """Let the noise follow what a picture had, as a share of the noise that was assumed."""
+        self.noise = min(max(self.noise * min(max(share, _FALLS), _RISES), _LEAST), 1.0)
 
     def add(self, newest: Snapshot) -> None:
         """Keep a picture, if it is not too close to the one before; forget old ones. Clocks that jump forget all."""

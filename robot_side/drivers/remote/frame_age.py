@@ -10,8 +10,6 @@ from robot_side.surroundings.age import Since, since
 from robot_side.surroundings.movers import Movers
 from robot_side.surroundings.perceived import PerceivedObjects
 
-_CARRIED_PERIOD_S: Final = 0.008
-"""Period in which moving objects are carried on: looks are made no more often"""
 _STILL_M_S: Final = 0.002
 """Speed up to which an object counts as at rest"""
 
@@ -33,7 +31,7 @@ class CarriedFrame:
         """Return the frame at `now_s`: the same object until something in it has changed."""
         known, shown = since(self.taken_s, now_s, self._unseen_m_s), self._shown_since
         moves, first = len(self._velocities_m_s) > 0, self._movers.first
-        due = moves and abs(known.carried_s + known.late_s - shown.carried_s - shown.late_s) >= _CARRIED_PERIOD_S
+        due = moves and known.is_later(shown)
         if self._shown is None or due or known.unseen_m != shown.unseen_m:
             self._shown_since = known
             by_m = known.carried_s * self._velocities_m_s
