@@ -64,10 +64,11 @@ def depth_cells(*, quick: bool) -> Cells:
             for noise, mount_error_m in errors:
                 depth = _cameras(eyes, noise, mount_error_m)
                 yield "bell", "50 ms", Placement(name, depth=depth)
-    yield "bell", "50 ms", Placement("ball", speed_m_s=-0.06)
-    for eyes in _EYES:
-        depth = _cameras(eyes, 1.0, _MOUNT_M)
-        yield "bell", "50 ms", Placement("ball", speed_m_s=-0.06, depth=depth)
+    for name, speed_m_s in (("ball", -0.06), ("hand", -0.15)):
+        yield "bell", "50 ms", Placement(name, speed_m_s=speed_m_s)
+        for eyes in _EYES:
+            depth = _cameras(eyes, 1.0, _MOUNT_M)
+            yield "bell", "50 ms", Placement(name, speed_m_s=speed_m_s, depth=depth)
 
 
 def _cameras(eyes: Eyes, noise: float, mount_error_m: float) -> DepthCameraSettings:

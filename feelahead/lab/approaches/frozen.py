@@ -41,14 +41,19 @@ PASSED: Final = (
 ASIDE: Final[dict[str, tuple[Vector2, Vector2]]] = {"edge": ((1.0, 0.0), (0.0, 0.0)), "turn": ((0.0, 0.0), (1.0, 0.0))}
 """Scenes in which a straight pull touches nothing, with the deflections of both sticks that end in a contact:
 (stick that moves across, stick that turns)."""
+REACHING: Final = ("hand",)
+"""Scenes of what reaches in, in a folder of their own: they are not frozen, and not in the hash."""
 GRIPPED: Final = ("place_held",)
 """Scenes in which the gripper holds an object before the pull begins."""
 _HASH_DIGITS = 12
 
 
 def frozen_scene(name: str) -> Path:
-    """Return the MJCF file of a frozen scene; ConfigurationError if it is missing, as in an installed wheel."""
-    path = SCENES / f"{name}.xml"
+    """Return the MJCF file of a frozen scene, or of one of REACHING; ConfigurationError if it is missing.
+
+    An installed wheel has none.
+    """
+    path = SCENES / ("reaching" if name in REACHING else "") / f"{name}.xml"
     if not path.is_file():
         names = (
             ", ".join((*AHEAD, *ASIDE, *PASSED))

@@ -9,7 +9,7 @@ from common.arrays import FloatArray, IntArray
 from robot_side.compiled.kernel import FLOAT64, INT64, compiled, input_array, output_array
 from robot_side.compiled.vectors import dot, subtract
 from robot_side.depth.motion.regions import AROUND, LABELS, Regions
-from robot_side.depth.motion.snapshots import Snapshot, surface_at
+from robot_side.depth.motion.snapshots import SURFACE, UNKNOWN, Snapshot, surface_at
 from robot_side.depth.picture import DepthArray, LabelArray
 from robot_side.depth.view import DIRECTIONS, MASK, PICTURE, ray_at, sd_at, to_world, turned_to_world
 
@@ -25,6 +25,12 @@ _SIGNIFICANT: Final = 5.0
 _AGREEING: Final = 0.6
 """Share of a region's points that must agree with its motion"""
 _FEWEST: Final = 8
+_STEPS_M: Final = tuple(0.005 * step for step in range(14))
+"""Distances by which a region may have slid along itself"""
+_LEAST_PIXELS: Final = 2.5
+"""Pixels by which it has at least, to count"""
+_MOST_OF: Final = 0.9
+"""Share of the points that appeared which must have come from somewhere"""
 _CLOSE: Final = 5
 """Pixels around those that are elsewhere by themselves that belong to what moves"""
 
@@ -40,6 +46,8 @@ class Fit(NamedTuple):
     """Root of the mean square distance from there"""
     points: float
     """Number of points that agree"""
+    slid: bool
+    """Whether it is a least distance, by where nothing was before"""
 
 
 def fit_motion(
@@ -55,25 +63,50 @@ def fit_motion(
 
     pixels_alike: number of pixels whose errors are one. start_m (3,): displacement that is expected.
     """
-    moved_m, sums = np.ascontiguousarray(start_m, dtype=float), np.empty(16)
-    for cap_m in _CAPS_M:
-        _sum(*newest.arrays, *before.arrays, *slack, cap_m, moved_m, regions.labels, region, sums)
-        if sums[9] < _FEWEST:
-            return None
+    sums = np.empty(16)
+
+    def solve(cap_m: float, from_m: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return the displacement by the points near `from_m` (3,), and eigenvalues and vectors of their matrix."""
+        _sum(*newest.arrays, *before.arrays, *slack, cap_m, from_m, regions.labels, region, sums)
         a, b, c, d, e, f = sums[:6] / pixels_alike
         values, vectors = np.linalg.eigh(np.array([[a, d, e], [d, b, f], [e, f, c]]))
-        shown = values > _SEEN * values[-1]
+        shown = values > max(_SEEN * values[-1], 1e-9)
         along = vectors[:, shown]
-        moved_m = along @ (along.T @ moved_m + along.T @ sums[6:9] / pixels_alike / values[shown])
-    information = float(values[shown] @ (along.T @ moved_m) ** 2)
+        by_m = along @ (along.T @ sums[6:9] / pixels_alike / values[shown])
+        return from_m + by_m, np.where(shown, values, 0.0), vectors
+
+    moved_m = np.ascontiguousarray(start_m, dtype=float)
+    for cap_m in _CAPS_M:
+        moved_m, values, vectors = solve(cap_m, moved_m)
+        moved_m = vectors[:, values > 0.0] @ (vectors[:, values > 0.0].T @ moved_m)
+    if sums[9] < _FEWEST:
+        return None
+    far_from_m = float(np.linalg.norm(sums[11:14] / sums[9] - newest.pose.position_m))
+    least_m = _LEAST_PIXELS * far_from_m / float(newest.view[0])
+    fitted, entered = moved_m, False
+    for way in (sign * vectors[:, k] for k in np.flatnonzero(values == 0.0) for sign in (-1.0, 1.0)):
+        # Points where nothing was must have come from somewhere: from no further than the nearest place on the region.
+        tried = []
+        for step_m in _STEPS_M:
+            slid_m, _, _ = solve(0.0, moved_m + step_m * way)
+            tried.append((step_m, sums[9] - _AGREEING * sums[10], slid_m))
+        gain = max(one[1] for one in tried) - tried[0][1]
+        step_m, _, slid_m = next(one for one in tried if one[1] >= tried[0][1] + _MOST_OF * gain)
+        if gain >= _FEWEST and step_m >= least_m and step_m > float(np.linalg.norm(fitted - moved_m)):
+            fitted, entered = slid_m, True
+    moved_m = fitted
+    solve(0.0, moved_m)
+    if sums[9] < _FEWEST:
+        return None
     center_m = sums[11:14] / sums[9]
-    seeming_m = slack[0] + slack[1] * float(np.linalg.norm(center_m - newest.pose.position_m))
-    far_m = float(np.linalg.norm(moved_m))
+    information = float(values @ (vectors.T @ moved_m) ** 2)
+    seeming_m = slack[0] + slack[1] * far_from_m
     agrees = sums[9] >= _AGREEING * sums[10]
-    if not agrees or information < _SIGNIFICANT**2 or far_m <= seeming_m + _LEAST_M:
+    significant = entered or information >= _SIGNIFICANT**2
+    if not agrees or not significant or float(np.linalg.norm(moved_m)) <= seeming_m + _LEAST_M:
         return None
     reach_m = math.sqrt(max(sums[14] / sums[9] - float(center_m @ center_m), 0.0))
-    return Fit(moved_m, center_m, reach_m, float(sums[9]))
+    return Fit(moved_m, center_m, reach_m, float(sums[9]), entered)
 
 
 def note_members(
@@ -134,9 +167,9 @@ def _sum(
             known, away, variance, normal = surface_at(
                 subtract(point, by), depth_before_m, normals_before, own_before, view_before
             )
-            if not known:
+            sums[10] += known != UNKNOWN
+            if known != SURFACE:
                 continue
-            sums[10] += 1.0
             variance += (sd_at(view, z) * dot(facing, (x, y, 1.0))) ** 2 + _LEAST_M**2
             near = abs(away) <= cap_m + _SIGMAS * math.sqrt(variance) + slack_m + slack * z
             if not near or dot(turned_to_world(view, facing), normal) < _ALIKE:
@@ -182,6 +215,7 @@ def _note(
             point = subtract(to_world(view, (x * z, y * z, z)), by)
             known, away, variance, _ = surface_at(point, depth_before_m, normals_before, own_before, view_before)
             variance += sd_at(view, z) ** 2
-            if not known or abs(away) <= _SIGMAS * math.sqrt(variance) + slack_m + slack * z + _LEAST_M:
+            near = abs(away) <= _SIGMAS * math.sqrt(variance) + slack_m + slack * z + _LEAST_M
+            if known == UNKNOWN or (known == SURFACE and near):
                 members[i, j] = identity
 

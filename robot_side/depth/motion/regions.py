@@ -8,7 +8,7 @@ import numpy as np
 from common.arrays import FloatArray, IntArray
 from robot_side.compiled.kernel import FLOAT64, INT64, array_of, compiled, input_array
 from robot_side.compiled.vectors import dot
-from robot_side.depth.motion.snapshots import Snapshot, surface_at
+from robot_side.depth.motion.snapshots import FREE, SURFACE, Snapshot, surface_at
 from robot_side.depth.picture import DepthArray, LabelArray
 from robot_side.depth.view import DIRECTIONS, MASK, PICTURE, ray_at, sd_at, to_world, turned_to_world
 
@@ -97,7 +97,9 @@ def _compare(
             x, y = ray_at(view, i, j)
             point = to_world(view, (x * z, y * z, z))
             known, away, variance, normal = surface_at(point, depth_before_m, normals_before, own_before, view_before)
-            if not known:
+            if known == FREE:
+                kinds[i, j], squares[i, j] = _AHEAD, _MOST_SQUARE
+            if known != SURFACE:
                 continue
             variance += (sd_at(view, z) * dot(facing, (x, y, 1.0))) ** 2
             total += min(away * away / variance, _SIGMAS * _SIGMAS)

@@ -103,7 +103,7 @@ class MotionSeer:
                     continue
                 velocity_m_s = fit.moved_m / since_s
                 later = earlier.of_age(now_s, 0.5 * since_s, newest)
-                if later is not None and later is not before:
+                if later is not None and later is not before and not fit.slid:
                     lately_s = now_s - later.taken_s
                     start_m = lately_s * velocity_m_s
                     sooner = fit_motion(

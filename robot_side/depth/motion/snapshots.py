@@ -11,7 +11,7 @@ from common.arrays import FloatArray
 from robot_side.compiled.kernel import building_block
 from robot_side.compiled.vectors import Vector, dot
 from robot_side.depth.picture import CameraPose, DepthArray, DepthErrors, DepthPicture, LabelArray, Pinhole
-from robot_side.depth.view import pixel_of, ray_at, sd_at, to_camera, turned_to_world, view_of
+from robot_side.depth.view import LEAST, MOST, pixel_of, ray_at, sd_at, to_camera, turned_to_world, view_of
 
 _WIDTH: Final = 160
 """Pixels to which the width of a picture is about reduced"""
@@ -93,24 +93,47 @@ class Earlier:
         return min(usable, key=lambda one: abs(now_s - one.taken_s - age_s), default=None)
 
 
+UNKNOWN: Final = 0
+SURFACE: Final = 1
+FREE: Final = 2
+"""What an earlier picture says about a place: nothing, a surface, or that nothing was there"""
+_INSIDE: Final = 1.1, 0.95
+"""Factors on the range within which something would have been measured"""
+
+
+@building_block
+def _is_hole(depth_m: DepthArray, own: LabelArray, row: int, column: int) -> bool:
+    """Return whether nothing at all is measured in nine pixels, of which none is the robot's."""
+    if row < 1 or column < 1 or row >= depth_m.shape[0] - 1 or column >= depth_m.shape[1] - 1:
+        return False
+    for i in range(row - 1, row + 2):
+        for j in range(column - 1, column + 2):
+            if depth_m[i, j] > 0.0 or own[i, j]:
+                return False
+    return True
+
+
 @building_block
 def surface_at(
     point: Vector, depth_m: DepthArray, normals: DepthArray, own: LabelArray, view: FloatArray
-) -> tuple[bool, float, float, Vector]:
+) -> tuple[int, float, float, Vector]:
     """Return how far a point is before the surface of an earlier picture, along that surface's normal.
 
-    The answer is whether anything is known there, the distance, its variance by the picture, and the normal (world).
+    The answer is what is known there, the distance, its variance by the picture, and the normal (world).
     """
     a = to_camera(view, point)
     if a[2] <= 0.0:
-        return False, 0.0, 0.0, point
+        return UNKNOWN, 0.0, 0.0, point
     i, j = pixel_of(view, a)
-    if i < 0 or j < 0 or i >= depth_m.shape[0] or j >= depth_m.shape[1]:
-        return False, 0.0, 0.0, point
+    if i < 0 or j < 0 or i >= depth_m.shape[0] or j >= depth_m.shape[1] or own[i, j]:
+        return UNKNOWN, 0.0, 0.0, point
     z, normal = 1.0 * depth_m[i, j], (1.0 * normals[i, j, 0], 1.0 * normals[i, j, 1], 1.0 * normals[i, j, 2])
-    if z <= 0.0 or own[i, j] or dot(normal, normal) == 0.0:
-        return False, 0.0, 0.0, point
+    if z <= 0.0:
+        measurable = _INSIDE[0] * view[LEAST] < a[2] < _INSIDE[1] * view[MOST]
+        return FREE if measurable and _is_hole(depth_m, own, i, j) else UNKNOWN, 0.0, 0.0, point
+    if dot(normal, normal) == 0.0:
+        return UNKNOWN, 0.0, 0.0, point
     x, y = ray_at(view, i, j)
     along = dot(normal, (x, y, 1.0))
     before = dot(normal, a) - z * along
-    return True, before, (sd_at(view, z) * along) ** 2, turned_to_world(view, normal)
+    return SURFACE, before, (sd_at(view, z) * along) ** 2, turned_to_world(view, normal)
