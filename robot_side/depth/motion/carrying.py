@@ -89,7 +89,9 @@ class Carried:
         margin_m = np.linalg.norm(boxes.half_sizes_m, axis=1) + edge_m
         low_m, high_m = points_m.min(axis=0), points_m.max(axis=0)
         near = np.flatnonzero(
-            ((boxes.centers_m >= low_m - margin_m[:, None]) & (boxes.centers_m <= high_m + margin_m[:, None])).all(axis=1)
+            ((boxes.centers_m >= low_m - margin_m[:, None]) & (boxes.centers_m <= high_m + margin_m[:, None])).all(
+                axis=1
+            )
         )
         areas = np.maximum(4.0 * boxes.half_sizes_m[:, :2].prod(axis=1) / edge_m**2, 1.0)
         for box in near.tolist():

@@ -8,8 +8,8 @@ import numpy as np
 from common.arrays import FloatArray, IntArray
 from robot_side.compiled.kernel import FLOAT64, INT64, compiled, input_array, output_array
 from robot_side.compiled.vectors import dot, subtract
-from robot_side.depth.motion.regions import AROUND, LABELS, Regions
-from robot_side.depth.motion.snapshots import SURFACE, UNKNOWN, Snapshot, surface_at
+from robot_side.depth.motion.regions import AROUND, LABELS, STILL_M, Regions
+from robot_side.depth.motion.snapshots import FREE, SURFACE, Snapshot, surface_at
 from robot_side.depth.picture import DepthArray, LabelArray
 from robot_side.depth.view import DIRECTIONS, MASK, PICTURE, ray_at, sd_at, to_world, turned_to_world
 
@@ -167,7 +167,7 @@ def _sum(
             known, away, variance, normal = surface_at(
                 subtract(point, by), depth_before_m, normals_before, own_before, view_before
             )
-            sums[10] += known != UNKNOWN
+            sums[10] += known == SURFACE or (known == FREE and slack_m <= STILL_M)
             if known != SURFACE:
                 continue
             variance += (sd_at(view, z) * dot(facing, (x, y, 1.0))) ** 2 + _LEAST_M**2
@@ -215,7 +215,7 @@ def _note(
             point = subtract(to_world(view, (x * z, y * z, z)), by)
             known, away, variance, _ = surface_at(point, depth_before_m, normals_before, own_before, view_before)
             variance += sd_at(view, z) ** 2
-            near = abs(away) <= _SIGMAS * math.sqrt(variance) + slack_m + slack * z + _LEAST_M
-            if known == UNKNOWN or (known == SURFACE and near):
+            far = _SIGMAS * math.sqrt(variance) + slack_m + slack * z + _LEAST_M
+            # What has come to where nothing was moves, although its motion may be underestimated.
+            if known != SURFACE or abs(away) <= far or (away > 0.0 and spreads[i, j] == AROUND):
                 members[i, j] = identity
-

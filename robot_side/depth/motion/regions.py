@@ -30,6 +30,8 @@ AROUND: Final = 5
 """Pixels around those that have come that belong to their region"""
 _CONTINUOUS: Final = 0.02
 """Share of the depth by which neighbours of one region may differ, beyond their errors"""
+STILL_M: Final = 0.0001
+"""Slack up to which a camera stands, so that what fills a hole has come: a moving one sees into holes by itself"""
 _MOST_SQUARE: Final = 25.0
 _MEAN: Final = 0.92
 """Mean of the squares of normal numbers, none above 2²"""
@@ -92,14 +94,18 @@ def _compare(
     for i in range(depth_m.shape[0]):
         for j in range(depth_m.shape[1]):
             z, facing = 1.0 * depth_m[i, j], (1.0 * normals[i, j, 0], 1.0 * normals[i, j, 1], 1.0 * normals[i, j, 2])
-            if z <= 0.0 or own[i, j] or dot(facing, facing) == 0.0:
+            if z <= 0.0 or own[i, j]:
                 continue
+            # Thin things, and edges, have no normals: they are no evidence, but belong to what moves.
+            plain = dot(facing, facing) > 0.0
             x, y = ray_at(view, i, j)
             point = to_world(view, (x * z, y * z, z))
             known, away, variance, normal = surface_at(point, depth_before_m, normals_before, own_before, view_before)
-            if known == FREE:
-                kinds[i, j], squares[i, j] = _AHEAD, _MOST_SQUARE
-            if known != SURFACE:
+            if known == FREE and slack_m <= STILL_M:
+                kinds[i, j], squares[i, j] = _AHEAD, _MOST_SQUARE if plain else 0.0
+            if known == SURFACE and not plain and away > _BEHIND_M:
+                kinds[i, j], squares[i, j] = _AHEAD, 0.0
+            if known != SURFACE or not plain:
                 continue
             variance += (sd_at(view, z) * dot(facing, (x, y, 1.0))) ** 2
             total += min(away * away / variance, _SIGMAS * _SIGMAS)

@@ -60,7 +60,9 @@ class Mover:
         there_m = self.center_m + (now_s - self.seen_s) * self.velocity_m_s
         apart_m_s = float(np.linalg.norm(velocity_m_s - self.velocity_m_s))
         near = float(np.linalg.norm(fit.center_m - there_m)) <= self.reach_m + fit.reach_m + _NEAR_M
-        return near and apart_m_s <= _SLOW_M_S + _ALIKE * max(float(np.linalg.norm(one)) for one in (velocity_m_s, self.velocity_m_s))
+        return near and apart_m_s <= _SLOW_M_S + _ALIKE * max(
+            float(np.linalg.norm(one)) for one in (velocity_m_s, self.velocity_m_s)
+        )
 
 
 class MotionSeer:
@@ -106,9 +108,7 @@ class MotionSeer:
                 if later is not None and later is not before and not fit.slid:
                     lately_s = now_s - later.taken_s
                     start_m = lately_s * velocity_m_s
-                    sooner = fit_motion(
-                        newest, later, regions, region, _seeming(newest, later), pixels_alike, start_m
-                    )
+                    sooner = fit_motion(newest, later, regions, region, _seeming(newest, later), pixels_alike, start_m)
                     faster = _FASTER * float(np.linalg.norm(velocity_m_s))
                     if sooner is not None and float(np.linalg.norm(sooner.moved_m)) > faster * lately_s:
                         velocity_m_s = sooner.moved_m / lately_s
