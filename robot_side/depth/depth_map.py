@@ -15,7 +15,7 @@ from robot_side.depth.motion.seer import MotionSeer
 from robot_side.depth.motion.snapshots import snapshot
 from robot_side.depth.octree.planes import Planes
 from robot_side.depth.own_body import own_pixels, within
-from robot_side.depth.picture import CameraPose, DepthErrors, DepthPicture, OwnBody
+from robot_side.depth.picture import CameraPose, DepthArray, DepthErrors, DepthPicture, LabelArray, OwnBody
 from robot_side.depth.pointing import patch_around
 from robot_side.depth.settings import MapSettings
 from robot_side.depth.support import normals, supported
@@ -75,9 +75,7 @@ class DepthMap:
         facing = normals(depth_m, view)
         self._carried.move(picture.taken_s, self.motion.movers)
         merged = self.surfels.integrate(picture, depth_m, facing, own, view, camera)
-        coarse = snapshot(picture, pose, errors, depth_m, facing, own, self.motion.noise(camera))
-        if (members := self.motion.see(coarse, errors, camera)) is not None:
-            self._carried.mark(coarse, members, self.motion.of_camera(camera))
+        self._find_motion(picture, pose, errors, depth_m, facing, own, camera)
         if body.models:
             rows = self.surfels.shown
             near = within(self.surfels.table.points_m[rows], body.known(), self.settings.padding_m)
@@ -98,12 +96,27 @@ class DepthMap:
             changed=changed,
         )
 
+    def _find_motion(
+        self,
+        picture: DepthPicture,
+        pose: CameraPose,
+        errors: DepthErrors,
+        depth_m: DepthArray,
+        facing: DepthArray,
+        own: LabelArray,
+        camera: int,
+    ) -> None:
+        """See what moves, and take the surfels that do."""
+        coarse = snapshot(picture, pose, errors, depth_m, facing, own, self.motion.noise(camera))
+        if (members := self.motion.see(coarse, errors, camera)) is not None:
+            self._carried.mark(coarse, members, self.motion.of_camera(camera))
+
     def boxes(self) -> Boxes:
         """Return the boxes behind all surfaces that have been in two pictures."""
         return self.planes.boxes()
 
     def velocities_m_s(self, boxes: Boxes) -> FloatArray:
-        """Return the velocity (n, 3) of each of the map's boxes, in the world; exactly 0 for what is not seen to move."""
+        """Return the velocity (n, 3) of each of the map's boxes, in the world; 0 for what is not seen to move."""
         return self._carried.velocities(boxes, self.motion.movers)
 
     def mark(self, box: int, role: Role) -> None:

@@ -123,8 +123,10 @@ class Slots:
     ) -> SlotChanges:
         """Give each box a slot, which it keeps as long as it is there, and return what changed.
 
-        errors: of the cameras. velocities_m_s (n, 3): of the boxes; None: all are at rest. holds: whether the gripper holds something. Slots that become free meanwhile stay free:
-        one may be that of the held object, and nobody would feel another box in it.
+        errors: of the cameras. velocities_m_s (n, 3): of the boxes; None: all are at rest.
+
+        holds: whether the gripper holds something. Slots that become free meanwhile stay free: one may be that of the
+        held object, and nobody would feel another box in it.
 
         near_m (3,): the gripper's place; if there are too many boxes, those nearest to it get slots. A box without a
         role is an obstacle; boxes of the target are its pieces; ignored ones get no slot.
@@ -175,8 +177,15 @@ class Slots:
         return self._changes(np.arange(len(self._ids)), 0)
 
     def _changes(self, slots: IntArray, crowded_out: int) -> SlotChanges:
-        columns = self._numbers, self._roles, self.sds_m, self._velocities_m_s, self._planes
-        return SlotChanges(slots, *(column[slots] for column in columns), crowded_out)
+        return SlotChanges(
+            slots,
+            self._numbers[slots],
+            self._roles[slots],
+            self.sds_m[slots],
+            self._velocities_m_s[slots],
+            self._planes[slots],
+            crowded_out,
+        )
 
     def apply(self, changes: SlotChanges) -> None:
         """Take over these changes.

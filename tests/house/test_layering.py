@@ -54,9 +54,10 @@ ARROWS = """
     robot_side/depth: common robot_side/compiled robot_side/surroundings robot_side/surroundings/kinds
     robot_side/depth/surfel_map: common robot_side/compiled robot_side/depth
     robot_side/depth/octree: common robot_side/compiled robot_side/depth robot_side/depth/surfel_map
+    robot_side/depth/motion: common robot_side/compiled robot_side/depth robot_side/depth/surfel_map
     robot_side/depth/pointing.py: common robot_side/depth robot_side/depth/surfel_map
-    robot_side/depth/depth_map.py: common robot_side/depth robot_side/depth/octree robot_side/depth/pointing.py
-        robot_side/depth/surfel_map
+    robot_side/depth/depth_map.py: common robot_side/depth robot_side/depth/motion robot_side/depth/octree
+        robot_side/depth/pointing.py robot_side/depth/surfel_map
     robot_side/depth/perception.py: common robot_side/depth robot_side/depth/depth_map.py robot_side/surroundings
     robot_side/gripper: common common/files robot_side/arm robot_side/overlap/meshes robot_side/surroundings
     robot_side/tick: common common/protocol robot_side/arm robot_side/surroundings

@@ -29,9 +29,9 @@ class RecordedDepth:
         frames: Callable[[], SurfaceFrames],
         seed: int,
     ) -> None:
-        """shift_m (3,), speed_m_s: of the objects, as in `shifted`, but before the pull, too. frames: makes empty frames.
+        """shift_m (3,), speed_m_s: of the objects, as in `shifted`, but before the pull, too.
 
-        seed: draws the cameras' errors.
+        frames: makes empty frames. seed: draws the cameras' errors.
         """
         self._replay, self._posed, self._rig = replay, posed, rig
         self._shift_m, self._speed_m_s, self._seed = shift_m, speed_m_s, seed

@@ -10,17 +10,19 @@ from robot_side.compiled.kernel import array_of, compiled, input_array, input_in
 from robot_side.compiled.vectors import add, scale
 from robot_side.depth.boxes import Boxes
 from robot_side.depth.grid import block_of
-from robot_side.depth.motion.regions import LABELS
+from robot_side.depth.motion.regions import LABELS, LabelsArray
 from robot_side.depth.motion.seer import Mover
 from robot_side.depth.motion.snapshots import Snapshot
 from robot_side.depth.surfel_map.merging import DIRTY
 from robot_side.depth.surfel_map.surfel_columns import Count, surfels_at
 from robot_side.depth.surfel_map.surfels import SurfelMap
 from robot_side.depth.together import planes_of
-from robot_side.depth.view import pixel_of, to_camera
+from robot_side.depth.view import pixel_of, sd_at, to_camera
 
 _FILLED: Final = 0.3
 """Share of a box's cells that must have surfels of a mover"""
+_SLOPE: Final = 0.02
+"""Share of the depth by which a surfel may differ from its pixel, beyond its errors"""
 _MOST_WEIGHT: Final = 2.0
 """Number of pictures that the mean of a moving surfel is worth at most"""
 
@@ -41,7 +43,8 @@ class Carried:
         rows = np.flatnonzero(self._movers)
         gone = (self._cells[rows] != table.cells[rows]) | ~np.isin(self._movers[rows], identities)
         self._movers[rows[gone]] = 0
-        return rows[~gone]
+        kept: IntArray = rows[~gone]
+        return kept
 
     def move(self, now_s: float, movers: dict[int, Mover]) -> None:
         """Let the surfels be where they are at `now_s`."""
@@ -57,7 +60,7 @@ class Carried:
         cells = (places[:, 0] * grid.cells[1] + places[:, 1]) * grid.cells[2] + places[:, 2]
         surfels.slot[table.cells[rows]] = -1
         # Where two surfels meet, one stays.
-        stay = np.zeros(len(rows), dtype=np.bool_)
+        stay: BoolArray = np.zeros(len(rows), dtype=np.bool_)
         stay[np.unique(np.where(inside, cells, -1), return_index=True)[1]] = True
         stay[inside] &= surfels.slot[cells[inside]] < 0
         stay &= inside
@@ -67,7 +70,7 @@ class Carried:
         surfels.look_again(kept[table.shown[kept] > 0])
         surfels.free(rows[~stay])
 
-    def mark(self, newest: Snapshot, members: IntArray, camera_movers: IntArray) -> None:
+    def mark(self, newest: Snapshot, members: LabelsArray, camera_movers: IntArray) -> None:
         """Take the surfels that the newest picture shows within what moves; let go of those beside it.
 
         members: as of `MotionSeer.see`. camera_movers: what moves in this camera's pictures.
@@ -105,10 +108,9 @@ class Carried:
 
 def _together(velocities_m_s: FloatArray, planes: IntArray, areas: FloatArray) -> FloatArray:
     """Return the mean velocity of each plane's boxes that move; 0 if these are the smaller part."""
-    moves: BoolArray = velocities_m_s.any(axis=1)
-    moving = np.bincount(planes, areas * moves)
-    means = np.stack([np.bincount(planes, areas * one) for one in velocities_m_s.T], axis=1)
-    means /= np.maximum(moving, 1e-12)[:, None]
+    moving = np.bincount(planes, areas * velocities_m_s.any(axis=1))
+    sums = np.stack([np.bincount(planes, areas * one) for one in velocities_m_s.T], axis=1)
+    means = sums / np.maximum(moving, 1e-12)[:, None]
     means[moving < 0.5 * np.bincount(planes, areas)] = 0.0
     together: FloatArray = means[planes]
     return together
@@ -121,7 +123,7 @@ def _together(velocities_m_s: FloatArray, planes: IntArray, areas: FloatArray) -
 def _mark(
     depth_m: np.ndarray,
     view: FloatArray,
-    members: IntArray,
+    members: LabelsArray,
     place: FloatArray,
     camera_movers: IntArray,
     bundle: IntArray,
@@ -142,6 +144,9 @@ def _mark(
         i, j = pixel_of(view, a)
         if i < 0 or j < 0 or i >= depth_m.shape[0] or j >= depth_m.shape[1]:
             continue
+        if abs(a[2] - depth_m[i, j]) > 3.0 * sd_at(view, a[2]) + _SLOPE * a[2]:
+            # Beside an edge the pixel shows something else.
+            continue
         if members[i, j] > 0:
             if movers[row] == 0:
                 # The means of earlier pictures are of where it was.
@@ -154,7 +159,7 @@ def _mark(
                 surfels.shown[row] = dirty[block_of(all_cells, surfels.cells[row])] = 1
             surfels.evidence[row] = 1
             surfels.weights[row] = min(surfels.weights[row], _MOST_WEIGHT)
-        elif movers[row] > 0 and depth_m[i, j] > 0.0:
+        elif movers[row] > 0:
             for one in range(camera_movers.size):
                 if camera_movers[one] == movers[row]:
                     movers[row] = 0

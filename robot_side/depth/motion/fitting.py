@@ -5,10 +5,10 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from common.arrays import FloatArray, IntArray
+from common.arrays import FloatArray
 from robot_side.compiled.kernel import FLOAT64, INT64, compiled, input_array, output_array
 from robot_side.compiled.vectors import dot, subtract
-from robot_side.depth.motion.regions import AROUND, LABELS, STILL_M, Regions
+from robot_side.depth.motion.regions import AROUND, LABELS, STILL_M, LabelsArray, Regions
 from robot_side.depth.motion.snapshots import FREE, SURFACE, Snapshot, surface_at
 from robot_side.depth.picture import DepthArray, LabelArray
 from robot_side.depth.view import DIRECTIONS, MASK, PICTURE, ray_at, sd_at, to_world, turned_to_world
@@ -117,19 +117,19 @@ def note_members(
     slack: tuple[float, float],
     moved_m: FloatArray,
     identity: int,
-    members: IntArray,
+    members: LabelsArray,
 ) -> None:
     """Write `identity` into the pixels of `members` (h, w) that have moved with their region."""
     _note(
-        *(*newest.arrays, *before.arrays, *slack, np.ascontiguousarray(moved_m)),
+        *(newest.depth_m, newest.view, *before.arrays, *slack, np.ascontiguousarray(moved_m)),
         *(regions.labels, regions.spreads, region, identity, members),
     )
 
 
-_PICTURES: Final = PICTURE, DIRECTIONS, MASK, input_array(1), PICTURE, DIRECTIONS, MASK, input_array(1)
+_BEFORE: Final = PICTURE, DIRECTIONS, MASK, input_array(1)
 
 
-@compiled(*_PICTURES, FLOAT64, FLOAT64, FLOAT64, input_array(1), LABELS, INT64, output_array(1))
+@compiled(*_BEFORE, *_BEFORE, FLOAT64, FLOAT64, FLOAT64, input_array(1), LABELS, INT64, output_array(1))
 def _sum(
     depth_m: DepthArray,
     normals: DepthArray,
@@ -143,11 +143,11 @@ def _sum(
     slack: float,
     cap_m: float,
     moved_m: FloatArray,
-    labels: IntArray,
+    labels: LabelsArray,
     region: int,
     sums: FloatArray,
 ) -> None:
-    """Sum the equations of a region's points; own: of no use, as regions have none of the robot's pixels.
+    """Sum the equations of a region's points.
 
     sums: matrix xx, yy, zz, xy, xz, yz; right side (3); points that agree, and all that could; sum of the points (3),
     and of their squares.
@@ -157,7 +157,7 @@ def _sum(
     by = moved_m[0], moved_m[1], moved_m[2]
     for i in range(depth_m.shape[0]):
         for j in range(depth_m.shape[1]):
-            if labels[i, j] != region:
+            if labels[i, j] != region or own[i, j]:
                 continue
             z, facing = 1.0 * depth_m[i, j], (1.0 * normals[i, j, 0], 1.0 * normals[i, j, 1], 1.0 * normals[i, j, 2])
             if dot(facing, facing) == 0.0:
@@ -186,11 +186,12 @@ def _sum(
             sums[14] += dot(point, point)
 
 
-@compiled(*_PICTURES, FLOAT64, FLOAT64, input_array(1), LABELS, LABELS, INT64, INT64, LABELS)
+@compiled(
+    *(PICTURE, input_array(1), *_BEFORE, FLOAT64, FLOAT64, input_array(1)),
+    *(LABELS, LABELS, INT64, INT64, LABELS),
+)
 def _note(
     depth_m: DepthArray,
-    normals: DepthArray,
-    own: LabelArray,
     view: FloatArray,
     depth_before_m: DepthArray,
     normals_before: DepthArray,
@@ -199,11 +200,11 @@ def _note(
     slack_m: float,
     slack: float,
     moved_m: FloatArray,
-    labels: IntArray,
-    spreads: IntArray,
+    labels: LabelsArray,
+    spreads: LabelsArray,
     region: int,
     identity: int,
-    members: IntArray,
+    members: LabelsArray,
 ) -> None:
     by = moved_m[0], moved_m[1], moved_m[2]
     for i in range(depth_m.shape[0]):

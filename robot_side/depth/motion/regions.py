@@ -4,14 +4,16 @@ import math
 from typing import Final, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
-from common.arrays import FloatArray, IntArray
+from common.arrays import FloatArray
 from robot_side.compiled.kernel import FLOAT64, INT64, array_of, compiled, input_array
 from robot_side.compiled.vectors import dot
 from robot_side.depth.motion.snapshots import FREE, SURFACE, Snapshot, surface_at
 from robot_side.depth.picture import DepthArray, LabelArray
 from robot_side.depth.view import DIRECTIONS, MASK, PICTURE, ray_at, sd_at, to_world, turned_to_world
 
+LabelsArray = npt.NDArray[np.int32]
 LABELS: Final = array_of(np.int32, 2)
 """Numba type of the numbers of regions (h, w); 0: none"""
 _SIGMAS: Final = 2.0
@@ -44,11 +46,12 @@ _MOST: Final = 64
 class Regions(NamedTuple):
     """Regions that are not where they were."""
 
-    labels: IntArray
+    labels: LabelsArray
     """(h, w) numbers of the regions, from 1; 0 or -1: none"""
-    spreads: IntArray
+    spreads: LabelsArray
     """(h, w) how many pixels further the region would reach: `AROUND` for those that are elsewhere by themselves"""
-    count: int
+    number: int
+    """How many there are"""
     noise: float
     """Variance of what stands still, as a share of that by the camera's errors"""
 
@@ -131,9 +134,9 @@ def _flood(
     kinds: LabelArray,
     squares: DepthArray,
     least: float,
-    labels: IntArray,
-    spreads: IntArray,
-    queue: IntArray,
+    labels: LabelsArray,
+    spreads: LabelsArray,
+    queue: LabelsArray,
 ) -> int:
     """Number the regions; return how many there are. queue: memory."""
     height, width = depth_m.shape

@@ -11,7 +11,7 @@ import numpy as np
 
 from common.arrays import FloatArray, IntArray
 from robot_side.depth.motion.fitting import Fit, fit_motion, note_members
-from robot_side.depth.motion.regions import moved_regions
+from robot_side.depth.motion.regions import LabelsArray, moved_regions
 from robot_side.depth.motion.snapshots import Earlier, Snapshot
 from robot_side.depth.picture import DepthErrors
 
@@ -58,11 +58,11 @@ class Mover:
     def is_at(self, fit: Fit, velocity_m_s: FloatArray, now_s: float) -> bool:
         """Return whether a region with this velocity is this thing."""
         there_m = self.center_m + (now_s - self.seen_s) * self.velocity_m_s
-        apart_m_s = float(np.linalg.norm(velocity_m_s - self.velocity_m_s))
-        near = float(np.linalg.norm(fit.center_m - there_m)) <= self.reach_m + fit.reach_m + _NEAR_M
-        return near and apart_m_s <= _SLOW_M_S + _ALIKE * max(
-            float(np.linalg.norm(one)) for one in (velocity_m_s, self.velocity_m_s)
+        apart_m_s, *speeds_m_s = (
+            float(np.linalg.norm(one)) for one in (velocity_m_s - self.velocity_m_s, velocity_m_s, self.velocity_m_s)
         )
+        near = float(np.linalg.norm(fit.center_m - there_m)) <= self.reach_m + fit.reach_m + _NEAR_M
+        return near and apart_m_s <= _SLOW_M_S + _ALIKE * max(speeds_m_s)
 
 
 class MotionSeer:
@@ -82,7 +82,7 @@ class MotionSeer:
         """Return the factor on the variance of a camera's errors by which standing things differ in its pictures."""
         return self._earlier[camera].noise
 
-    def see(self, newest: Snapshot, errors: DepthErrors, camera: int) -> IntArray | None:
+    def see(self, newest: Snapshot, errors: DepthErrors, camera: int) -> LabelsArray | None:
         """Return the identity of the mover that each pixel (h, w) shows, 0 for none; None if nothing moves.
 
         camera: number of the one that took it.
@@ -91,13 +91,13 @@ class MotionSeer:
         earlier = self._earlier[camera]
         pixels_alike = max(1.0, (2.0 * errors.correlation * float(newest.view[0])) ** 2)
         mine = set(self.of_camera(camera).tolist())
-        members = np.zeros(newest.depth_m.shape, dtype=np.int32)
+        members: LabelsArray = np.zeros(newest.depth_m.shape, dtype=np.int32)
         found: set[int] = set()
         for before in _to_compare(earlier, newest, [movers[one] for one in mine]):
             since_s, slack = now_s - before.taken_s, _seeming(newest, before)
             regions = moved_regions(newest, before, slack, pixels_alike)
             earlier.measure(regions.noise)
-            for region in range(1, regions.count + 1):
+            for region in range(1, regions.number + 1):
                 expected = [since_s * movers[one].velocity_m_s for one in mine] + [np.zeros(3)]
                 tries = (fit_motion(newest, before, regions, region, slack, pixels_alike, one) for one in expected)
                 fit = max((one for one in tries if one is not None), key=lambda one: one.points, default=None)

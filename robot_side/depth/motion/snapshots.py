@@ -59,10 +59,10 @@ def snapshot(
     # The middle of each pixel that is kept stays where it is.
     middle = 0.5 - 0.5 / step
     coarse = Pinhole(fine.fx / step, fine.fy / step, fine.cx / step + middle, fine.cy / step + middle)
-    kept = (np.ascontiguousarray(one[every]) for one in (depth_m, normals, own))
     by = math.sqrt(noise)
     scaled = replace(errors, growth_per_m=by * errors.growth_per_m, floor_m=by * errors.floor_m)
-    return Snapshot(picture.taken_s, pose, *kept, view_of(coarse, pose, scaled))
+    view, kept = view_of(coarse, pose, scaled), np.ascontiguousarray
+    return Snapshot(picture.taken_s, pose, kept(depth_m[every]), kept(normals[every]), kept(own[every]), view)
 
 
 class Earlier:

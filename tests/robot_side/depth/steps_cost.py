@@ -47,6 +47,7 @@ def measure(width: int, height: int) -> None:
         timed(steps, name)
     for owner, name in ((depth_map.surfels, "integrate"), (depth_map.planes, "follow"), (depth_map.seen, "see")):
         timed(owner, name)
+    timed(depth_map, "_find_motion")
     changed = []
     for k in range(_FRAMES):
         noisy = depth_m + camera.errors.growth_per_m * depth_m**2 * alike(random, depth_m.shape)

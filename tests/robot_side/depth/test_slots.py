@@ -162,6 +162,8 @@ def test_a_history_of_changes_is_as_good_as_all_at_once(history: list[list[int]]
     ],
 )
 def test_wrong_changes_are_refused(changed: dict[str, Any], complaint: str) -> None:
-    valid = SlotChanges(np.array([0]), np.ones((1, 15)), np.array([0]), np.zeros(1), np.array([-1]), 0)
+    valid = SlotChanges(
+        np.array([0]), np.ones((1, 15)), np.array([0]), np.zeros(1), np.zeros((1, 3)), np.array([-1]), 0
+    )
     with pytest.raises(ValueError, match=complaint):
         Slots(64).apply(replace(valid, **changed))
