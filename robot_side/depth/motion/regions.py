@@ -39,7 +39,7 @@ _MEAN: Final = 0.92
 """Mean of the squares of normal numbers, none above 2²"""
 _FEWEST: Final = 6
 """Pixels that have come, of the smallest region"""
-_MOST: Final = 64
+_MOST: Final = 12
 """Largest number of regions"""
 
 

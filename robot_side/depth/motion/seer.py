@@ -36,6 +36,8 @@ _TURN: Final = 0.01
 _PLACE_M: Final = 0.006
 _SIGMAS: Final = 3.0
 """Error of a mount, in rad and in m, that makes things seem to move while their camera does; standard deviations"""
+_LEAST_ALIKE: Final = 9.0
+"""Least number of pixels whose errors count as one: normals and support are of neighbours, whatever a camera says"""
 _OF_CAMERA: Final = 256
 
 
@@ -89,7 +91,7 @@ class MotionSeer:
         """
         now_s, movers = newest.taken_s, self.movers
         earlier = self._earlier[camera]
-        pixels_alike = max(1.0, (2.0 * errors.correlation * float(newest.view[0])) ** 2)
+        pixels_alike = max(_LEAST_ALIKE, (2.0 * errors.correlation * float(newest.view[0])) ** 2)
         mine = set(self.of_camera(camera).tolist())
         members: LabelsArray = np.zeros(newest.depth_m.shape, dtype=np.int32)
         found: set[int] = set()
@@ -98,9 +100,9 @@ class MotionSeer:
             regions = moved_regions(newest, before, slack, pixels_alike)
             earlier.measure(regions.noise)
             for region in range(1, regions.number + 1):
-                expected = [since_s * movers[one].velocity_m_s for one in mine] + [np.zeros(3)]
+                expected = [np.zeros(3), *(since_s * movers[one].velocity_m_s for one in mine)]
                 tries = (fit_motion(newest, before, regions, region, slack, pixels_alike, one) for one in expected)
-                fit = max((one for one in tries if one is not None), key=lambda one: one.points, default=None)
+                fit = next((one for one in tries if one is not None), None)
                 if fit is None:
                     continue
                 velocity_m_s = fit.moved_m / since_s
@@ -115,7 +117,8 @@ class MotionSeer:
                 identity = self._update(fit, velocity_m_s, now_s, mine, found, camera)
                 if movers[identity].counts:
                     note_members(newest, before, regions, region, slack, fit.moved_m, identity, members)
-            if found:
+            # What moves is elsewhere than in any earlier picture.
+            if found or regions.number == 0:
                 break
         for identity in mine - found:
             if now_s - movers[identity].seen_s > _UNSEEN_S or not movers[identity].counts:
