@@ -83,21 +83,32 @@ def inflation_and_distance(missed: DirectionalErrors, kinematic: float) -> tuple
 
 
 @inlined
-def around_spheres(spheres: FloatArray, inflated: FloatArray, first: int, end: int) -> tuple[Vector, float]:
-    """Return centre and radius of a sphere that contains the inflated spheres from `first` to before `end`.
-
-    spheres (m, 4). Each is inflated by the first column of `inflated` (m, 1 or more).
-    """
+def around_spheres(spheres: FloatArray, first: int, end: int) -> tuple[Vector, float]:
+    """Return centre and radius of a sphere that contains the spheres (m, 4) from `first` to before `end`."""
     x, y, z, count = 0.0, 0.0, 0.0, max(end - first, 1)
     for i in range(first, end):
         x, y, z = x + spheres[i, 0], y + spheres[i, 1], z + spheres[i, 2]
     middle, radius = (x / count, y / count, z / count), 0.0
     for i in range(first, end):
-        radius = max(radius, norm(subtract(load(spheres, i), middle)) + spheres[i, 3] + inflated[i, 0])
+        radius = max(radius, norm(subtract(load(spheres, i), middle)) + spheres[i, 3])
     return middle, radius
 
 
-@inlined
+@building_block
+def _group(scratch_bundle: IntArray, groups: FloatArray, ranges: FloatArray, together: int, count: int) -> None:
+    """Bound each group of so many of the scratch's spheres, and their variances from the encoders."""
+    scratch = scratch_at(scratch_bundle)
+    for first in range(0, count, together):
+        end, number, least, most = min(first + together, count), first // together, math.inf, 0.0
+        middle, radius = around_spheres(scratch.spheres, first, end)
+        for i in range(first, end):
+            least, most = min(least, scratch.kinematic_m2[i, 0]), max(most, scratch.kinematic_m2[i, 0])
+        group, its = groups[number], ranges[number]
+        group[0], group[1], group[2] = middle
+        its[0], its[1], its[2] = radius, least, most
+
+
+@building_block
 def place_spheres(
     centers: FloatArray,
     radii: FloatArray,
@@ -106,50 +117,78 @@ def place_spheres(
     jacobian: FloatArray,
     encoder_variance: FloatArray,
     along: Vector,
-    scratch: ScratchColumns,
+    scratch_bundle: IntArray,
 ) -> bool:
-    """Fill the scratch's spheres and their variances from the encoders. Return False for numbers that are not finite.
+    """Fill the scratch's spheres, and their variances from the encoders, and group them.
 
-    centers (m, 3), radii (m,), on_finger (m,).
+    Return False for numbers that are not finite. centers (m, 3), radii (m,), on_finger (m,).
     """
-    spheres, check = scratch.spheres, 0.0
-    spread = spread_along(jacobian, encoder_variance, along)
-    for i in range(radii.size):
+    scratch, count, check = scratch_at(scratch_bundle), radii.size, 0.0
+    spheres, spread = scratch.spheres, spread_along(jacobian, encoder_variance, along)
+    for i in range(count):
         arm = subtract(load(centers, i), tool)
         kinematic = variance_at(spread, arm)
         spheres[i, 0], spheres[i, 1], spheres[i, 2], spheres[i, 3] = *load(centers, i), radii[i]
         scratch.kinematic_m2[i, 0], scratch.on_finger[i] = kinematic, on_finger[i]
         check += kinematic + arm[0] + arm[1] + arm[2] + radii[i]
+    _group(scratch_bundle, scratch.clusters, scratch.cluster_ranges, CLUSTER, count)
+    _group(scratch_bundle, scratch.parts, scratch.part_ranges, PART, count)
+    _group(scratch_bundle, scratch.whole, scratch.whole_range, max(count, 1), count)
     return math.isfinite(check)
+
+
+@inlined
+def _inflate_groups(missed: DirectionalErrors, groups: FloatArray, ranges: FloatArray, count: int) -> None:
+    """Set the groups' radii: inflation rises or falls with the variance throughout."""
+    for group in range(count):
+        least, _ = inflation_and_distance(missed, ranges[group, 1])
+        most, _ = inflation_and_distance(missed, ranges[group, 2])
+        groups[group, 3] = ranges[group, 0] + max(least, most)
+
+
+@inlined
+def inflate_sphere(missed: DirectionalErrors, scratch: ScratchColumns, i: int) -> float:
+    """Fill the inflation of the scratch's sphere `i`; return its D_σ."""
+    scratch.inflation_m[i, 0], whole = inflation_and_distance(missed, scratch.kinematic_m2[i, 0])
+    return whole
 
 
 @building_block
 def inflate(missed: DirectionalErrors, scratch_bundle: IntArray, count: int) -> bool:
-    """Fill inflations, D_σ, errors, clusters and parts of the scratch's first `count` spheres.
+    """Fill the errors along the direction, and the radii of the groups of the scratch's first `count` spheres.
 
     Return False for numbers that are not finite.
     """
     scratch = scratch_at(scratch_bundle)
-    errors, expected = scratch.along_m, missed.mean + missed.mean_along
-    check = expected + missed.variance + missed.variance_along + missed.quantile + missed.unseen
-    errors[:] = 0.0
+    errors, range_m2 = scratch.along_m, scratch.whole_range[0]
+    expected, most = missed.mean + missed.mean_along, 0.0
     errors[Error.EXPECTED] = max(0.0, expected)
+    if missed.quantile >= 0.0 and missed.mean + missed.unseen >= 0.0:
+        # The root of a sum rises by the less, the larger the other summand.
+        inflation, whole = inflation_and_distance(missed, range_m2[1])
+        most = max(0.0, whole - inflation)
+    else:
+        for i in range(count):
+            inflation, whole = inflation_and_distance(missed, scratch.kinematic_m2[i, 0])
+            most = max(most, whole - inflation)
+    errors[Error.ALONG] = most if count > 0 else 0.0
+    _inflate_groups(missed, scratch.clusters, scratch.cluster_ranges, (count + CLUSTER - 1) // CLUSTER)
+    _inflate_groups(missed, scratch.parts, scratch.part_ranges, (count + PART - 1) // PART)
+    _inflate_groups(missed, scratch.whole, scratch.whole_range, 1)
+    # max() may hide NaN; the sum does not.
+    return math.isfinite(expected + missed.variance + missed.variance_along + missed.quantile + missed.unseen)
+
+
+@building_block
+def inflate_all(missed: DirectionalErrors, scratch_bundle: IntArray, count: int) -> bool:
+    """Do as `inflate`; fill also inflation and D_σ of each of the first `count` spheres."""
+    scratch, largest, check = scratch_at(scratch_bundle), 0.0, 0.0
     for i in range(count):
-        inflation, whole = inflation_and_distance(missed, scratch.kinematic_m2[i, 0])
-        scratch.inflation_m[i, 0], scratch.sigma_m[i, 0] = inflation, whole
-        errors[Error.LARGEST] = max(errors[Error.LARGEST], whole)
-        errors[Error.ALONG] = max(errors[Error.ALONG], whole - inflation)
-        # max() may hide NaN; the sum does not.
-        check += whole + inflation
-    for first in range(0, count, CLUSTER):
-        middle, radius = around_spheres(scratch.spheres, scratch.inflation_m, first, min(first + CLUSTER, count))
-        cluster = scratch.clusters[first // CLUSTER]
-        cluster[0], cluster[1], cluster[2], cluster[3] = *middle, radius
-    for first in range(0, count, PART):
-        middle, radius = around_spheres(scratch.spheres, scratch.inflation_m, first, min(first + PART, count))
-        part = scratch.parts[first // PART]
-        part[0], part[1], part[2], part[3] = *middle, radius
-    return math.isfinite(check)
+        whole = inflate_sphere(missed, scratch, i)
+        scratch.sigma_m[i, 0], largest = whole, max(largest, whole)
+        check += whole + scratch.inflation_m[i, 0]
+    scratch.along_m[Error.LARGEST] = largest
+    return inflate(missed, scratch_bundle, count) and math.isfinite(check)
 
 
 @inlined

@@ -26,8 +26,9 @@ from robot_side.compiled.vectors import Vector, load
 from robot_side.field.inflation import (
     ERRORS,
     DirectionalErrors,
-    around_spheres,
     inflate,
+    inflate_all,
+    inflate_sphere,
     most_along,
     place_spheres,
 )
@@ -37,7 +38,7 @@ from robot_side.field.pairs import enter, pairs_of
 from robot_side.field.profile import follow
 from robot_side.field.samples import Profile
 from robot_side.field.scratch import MOST_WORK, PART, SCRATCH, STRENGTHS, Bundles, Count, Error, ScratchColumns
-from robot_side.field.surfaces import approach_of, errors_of, keep_pieces, queue_objects
+from robot_side.field.surfaces import approach_of, begin_surfaces, errors_of, keep_pieces, queue_objects
 from robot_side.surroundings.kinds.layout import MESH
 from robot_side.surroundings.scene_columns import SCENE
 
@@ -58,6 +59,15 @@ def _last_to_count(scratch: ScratchColumns, margin: float) -> float:
 
 
 @inlined
+def _last_contact(scratch: ScratchColumns, far: float, lead: float) -> float:
+    """Return the contact distance beyond which no contact of the present object counts, at most `far`.
+
+    What is overlapped already counts always: there the uninflated spheres have more lead.
+    """
+    return max(min(far, _last_to_count(scratch, MARGIN_M) + lead), 0.0)
+
+
+@inlined
 def _within_budget(scratch: ScratchColumns, pairs: int) -> bool:
     """Return whether the look may go on. pairs: those of the present object, which are not counted yet."""
     within: bool = scratch.counts[Count.PAIRS] + pairs + scratch.counts[Count.OVERLAPS] <= MOST_WORK
@@ -74,7 +84,7 @@ def _follow(bundles: Bundles, item: int, rows: int, volume: float, along: Vector
     pair = scratch.pairs[item]
     center, end = load(scratch.spheres, pair.sphere), reach + MARGIN_M + pair.lead
     # No sample that matters lies more than a margin beyond the last distance that counts.
-    entered = min(end, _last_to_count(scratch, MARGIN_M) + MARGIN_M + pair.lead)
+    entered = min(end, _last_to_count(scratch, MARGIN_M) + pair.lead) + MARGIN_M
     entries = enter(bundles, pair, rows, along, entered)
     # Each sphere counts once: an uninflated pair follows the sphere's inflated one, and those that waited come again.
     if waits and (item == 0 or scratch.pairs[item - 1].sphere != pair.sphere):
@@ -95,18 +105,19 @@ def _look_at(
     along: Vector,
     half_gap: float,
     reach: float,
+    errors: DirectionalErrors,
 ) -> None:
     """Shorten the onset distances by one object, best first. The object's rows within the reach have been kept.
 
     Parts, clusters and pairs share one queue: pair p is the item p, cluster c the item -1 - c. While only a lower bound
     of a cluster's contact is known, the cluster is the item -1 - c - (number of clusters). A part is an item beyond
     these. Pairs that wait until all others are done lie at the other end of the queue's array. volume: the object's.
-    lead: that which all pairs of the object have in common.
+    lead: that which all pairs of the object have in common. errors: those of the object.
     """
     scene, scratch = scene_at(bundles.scene), scratch_at(bundles.scratch)
     keys, items, count, pairs, waiting, margin = scratch.keys_m, scratch.items, 0, 0, 0, MARGIN_M
     far, nearest = reach + margin + lead, math.inf
-    clusters, last = (spheres + CLUSTER - 1) // CLUSTER, min(far, _last_to_count(scratch, margin) + lead)
+    clusters, last = (spheres + CLUSTER - 1) // CLUSTER, _last_contact(scratch, far, lead)
     for part in range((spheres + PART - 1) // PART):
         bound, _ = bound_of(bundles, rows, scratch.parts, part, along, last, True)
         if bound <= last:
@@ -114,7 +125,7 @@ def _look_at(
     while count > 0 and keys[0] < _last_to_count(scratch, margin) and _within_budget(scratch, pairs):
         item, first = items[0], keys[0]
         count = drop_first(keys, items, count)
-        last = min(far, _last_to_count(scratch, margin) + lead)
+        last = _last_contact(scratch, far, lead)
         if item >= 0:
             if _follow(bundles, item, rows, volume, along, reach, True):
                 waiting += 1
@@ -128,6 +139,7 @@ def _look_at(
         else:
             clear = first > -math.inf
             for i in range((-1 - item) * CLUSTER, min(-item * CLUSTER, spheres)):
+                inflate_sphere(errors, scratch, i)
                 met = pairs_of(bundles, pairs, i, rows, thing, object_class, lead, along, half_gap, last, clear)
                 for place in range(pairs, pairs + met):
                     pair = scratch.pairs[place]
@@ -241,17 +253,18 @@ def look(
     along, margin, spheres = load(direction.reshape(1, 3), 0), MARGIN_M, radii.size
     scratch.distances_m[:], scratch.counts[:] = math.inf, 0
     finite = place_spheres(
-        centers, radii, on_finger, load(tool.reshape(1, 3), 0), jacobian, encoder_variance, along, scratch
+        centers, radii, on_finger, load(tool.reshape(1, 3), 0), jacobian, encoder_variance, along, scratch_bundle
     )
-    if not (inflate(errors, scratch_bundle, spheres) and finite and math.isfinite(reach + approach.sum())):
+    if not (inflate_all(errors, scratch_bundle, spheres) and finite and math.isfinite(reach + approach.sum())):
         return False
-    middle, size = around_spheres(scratch.spheres, scratch.inflation_m, 0, spheres)
+    middle, size = load(scratch.whole, 0), scratch.whole[0, 3]
     differ = of_objects.size > 0
     shorter = most_along(errors) if differ else scratch.along_m[Error.ALONG]
-    count = queue_objects(bundles, classes, approach, along, middle, size, spheres, shorter, reach + margin)
+    begin_surfaces(bundles, classes, errors.quantile >= 0.0, approach, of_objects)
+    count = queue_objects(bundles, classes, approach, along, middle, size, spheres, shorter, reach + 2.0 * margin)
     keys, things, inflated = scratch.bounds_m, scratch.objects, errors
     while count > 0 and keys[0] < _last_to_count(scratch, margin) and _within_budget(scratch, 0):
-        thing = things[0]
+        thing, examined = things[0], min(reach, 2.0 * max(keys[0], margin))
         count = drop_first(keys, things, count)
         own = errors_of(bundles, thing, classes, errors, of_objects) if differ else errors
         if own.unseen != inflated.unseen or own.variance != inflated.variance:
@@ -259,10 +272,11 @@ def look(
                 return False
             inflated = own
         lead = scratch.along_m[Error.ALONG] + approach_of(bundles, thing, classes, approach)
-        rows, volume = keep_pieces(bundles, thing, classes, middle, size, along, reach + margin + lead)
-        _look_at(bundles, spheres, rows, volume, thing, classes[thing], lead, along, half_gap, reach)
-    if differ:  # The result's D_σ are those of the largest errors.
-        inflate(errors, scratch_bundle, spheres)
+        rows, volume = keep_pieces(bundles, thing, classes, middle, size, along, examined + 2.0 * margin + lead)
+        _look_at(bundles, spheres, rows, volume, thing, classes[thing], lead, along, half_gap, examined, inflated)
+        # An object that never gives full strength, as one beside the gripper, would be followed all the way.
+        if examined < reach and _last_to_count(scratch, 0.0) > examined:
+            count = push(keys, things, count, examined + margin, thing)
     if not _within_budget(scratch, 0):
         # What was not looked at may be anywhere.
         scratch.counts[Count.CUT], scratch.distances_m[:] = 1, 0.0

@@ -61,9 +61,7 @@ def bound_rows(bundles: Bundles, rows: int) -> None:
         for axis in range(4):
             scratch.row_bounds[k, axis] = scene.bounds[scratch.rows[k], axis]
     for first in range(0, rows, ROWS_TOGETHER):
-        middle, radius = around_spheres(
-            scratch.row_bounds, scratch.no_inflation, first, min(first + ROWS_TOGETHER, rows)
-        )
+        middle, radius = around_spheres(scratch.row_bounds, first, min(first + ROWS_TOGETHER, rows))
         block = scratch.row_blocks[first // ROWS_TOGETHER]
         block[0], block[1], block[2], block[3] = *middle, radius
 

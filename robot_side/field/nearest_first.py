@@ -1,14 +1,22 @@
-"""Queue of numbered items in two arrays: a binary heap with the item of the least key first."""
+"""Queue of numbered items in two arrays: a binary heap with the item of the least key first, of these the least number.
+
+So the order does not depend on when items were added.
+"""
 
 from common.arrays import FloatArray, IntArray
-from robot_side.compiled.kernel import building_block
+from robot_side.compiled.kernel import building_block, inlined
+
+
+@inlined
+def _is_before(keys: FloatArray, items: IntArray, place: int, key: float, item: int) -> bool:
+    return keys[place] < key or (keys[place] == key and items[place] < item)
 
 
 @building_block
 def push(keys: FloatArray, items: IntArray, count: int, key: float, item: int) -> int:
     """Add an item with its key to a queue of `count` items; return the new count."""
     place = count
-    while place > 0 and keys[(place - 1) // 2] > key:
+    while place > 0 and not _is_before(keys, items, (place - 1) // 2, key, item):
         above = (place - 1) // 2
         keys[place], items[place] = keys[above], items[above]
         place = above
@@ -23,9 +31,9 @@ def drop_first(keys: FloatArray, items: IntArray, count: int) -> int:
     key, item = keys[left], items[left]
     while 2 * place + 1 < left:
         below = 2 * place + 1
-        if below + 1 < left and keys[below + 1] < keys[below]:
+        if below + 1 < left and _is_before(keys, items, below + 1, keys[below], items[below]):
             below += 1
-        if keys[below] >= key:
+        if not _is_before(keys, items, below, key, item):
             break
         keys[place], items[place] = keys[below], items[below]
         place = below

@@ -10,11 +10,10 @@ still become shorter (`bounds_on_rise`), and where a strength begins by the cubi
 import math
 from typing import Final, NamedTuple
 
-from common.arrays import FloatArray
 from robot_side.compiled.kernel import building_block, inlined
 from robot_side.field.bounds_on_rise import begin, keep_tangents, latest_of, matters, may_count
 from robot_side.field.samples import NOTHING, Profile, Sample, cubic, next_entry, on_cubic, peak, sample
-from robot_side.field.scratch import SAMPLES, SCRATCH, STRENGTHS, Bundles, Count
+from robot_side.field.scratch import SAMPLES, SCRATCH, STRENGTHS, Bundles, Count, ScratchColumns
 
 scratch_at = SCRATCH.at
 _TOLERANCE_M: Final = 2e-5
@@ -235,7 +234,7 @@ def follow(profile: Profile, least: float, waits: bool, bundles: Bundles) -> boo
         level = _take(profile, level, free, second, baseline, reference, bundles)
         level = _take(profile, level, second, full, baseline, reference, bundles)
         last = full
-    elif _is_late(profile, free, second, full, baseline, reference, distances):
+    elif _is_late(profile, free, second, full, baseline, reference, scratch):
         return False
     else:
         reference, stored = max(reference, _most_over_margin(profile, rise, second, full, bundles)), SAMPLES
@@ -251,17 +250,22 @@ def _is_late(
     full: Sample,
     baseline: float,
     reference: float,
-    distances: FloatArray,
+    scratch: ScratchColumns,
 ) -> bool:
     """Return whether the overlap seems to rise all along the margin, and every strength begins too late to count.
 
-    free, second, full: samples at the beginning of the margin, within it and at its end.
+    free, second, full: samples at the beginning of the margin, within it and at its end; `second` is the newest.
     """
+    for k in range(profile.entries):
+        part = scratch.entries[k]
+        # What is small may have been grazed and left before the first sample.
+        if part.closing > 0.0 and part.enters < second.at and not (part.volume > 0.0 and part.slope >= 0.0):
+            return False
     if not (baseline <= second.volume <= full.volume and min(free.slope, second.slope, full.slope) >= 0.0):
         return False
     late = True
     for level in range(STRENGTHS):
-        latest = latest_of(profile, level, distances)
+        latest = latest_of(profile, level, scratch.distances_m)
         at = min(latest + _DOUBT * (full.at - second.at), full.at)
         a, b = (free, second) if at < second.at else (second, full)
         reached = cubic(a, b, max(at - a.at, 0.0) / (b.at - a.at))

@@ -75,6 +75,20 @@ class Error(IntEnum):
     """D_σ at P = 0.5, the same for all spheres"""
 
 
+class OfSurface(IntEnum):
+    """Indices of a surface's numbers."""
+
+    BOUND = 0
+    """Key of the surface, the least of its pieces'"""
+    VOLUME = 1
+    UNSEEN = 2
+    """Largest motion of its pieces that nobody saw"""
+    VARIANCE = 3
+    """Variance of its pieces' positions that makes the most of the errors"""
+    APPROACH = 4
+    """Largest distance by which its pieces approach"""
+
+
 class Bundles(NamedTuple):
     """Bundles of a scene and of the scratch.
 
@@ -94,20 +108,22 @@ class ScratchColumns(NamedTuple):
     inflation_m: FloatArray
     sigma_m: FloatArray
     clusters: FloatArray
+    cluster_ranges: FloatArray
     parts: FloatArray
+    part_ranges: FloatArray
+    whole: FloatArray
+    whole_range: FloatArray
     keys_m: FloatArray
     items: IntArray
     pairs: np.ndarray
     objects: IntArray
     bounds_m: FloatArray
-    next_pieces: IntArray
+    near: BoolArray
     first_pieces: IntArray
-    surface_bounds_m: FloatArray
-    surface_volumes_m3: FloatArray
+    of_surfaces: FloatArray
     rows: IntArray
     row_bounds: FloatArray
     row_blocks: FloatArray
-    no_inflation: FloatArray
     entries: np.ndarray
     samples: FloatArray
     overlap_gradient: FloatArray
@@ -118,8 +134,8 @@ class ScratchColumns(NamedTuple):
 
 SCRATCH: Final = Declared(
     ScratchColumns,
-    *(rows(4), FLAGS, rows(1), rows(1), rows(1), rows(4), rows(4), NUMBERS, INDICES, records(PAIR), INDICES, NUMBERS),
-    *(INDICES, INDICES, NUMBERS, NUMBERS, INDICES, rows(4), rows(4), rows(1)),
+    *(rows(4), FLAGS, rows(1), rows(1), rows(1), *(rows(4), rows(3)) * 3, NUMBERS, INDICES, records(PAIR)),
+    *(INDICES, NUMBERS, FLAGS, INDICES, rows(len(OfSurface)), INDICES, rows(4), rows(4)),
     *(records(ENTRY), rows(2), NUMBERS, rows(STRENGTHS), NUMBERS, INDICES),
 )
 
@@ -134,13 +150,20 @@ class Scratch:
         self.kinematic_m2: FloatArray = np.zeros((spheres, 1))
         """Variance of each sphere's position from the encoders, along the direction of the look"""
         self.inflation_m: FloatArray = np.zeros((spheres, 1))
-        """Inflation I of each sphere towards the present object: errors of camera and arm at P"""
+        """Inflation I of each sphere in a cluster that is examined, towards the present object: errors of camera and arm
+        at P"""
         self.sigma_m: FloatArray = np.zeros((spheres, 1))
-        """D_σ of each sphere towards the present object at P: errors of camera, arm and prediction"""
+        """D_σ of each sphere at P, by the largest errors of all objects: errors of camera, arm and prediction"""
         self.clusters: FloatArray = np.zeros((spheres // CLUSTER + 1, 4))
         """Bounding sphere of each cluster of inflated spheres"""
-        self.parts: FloatArray = np.full((spheres // PART + 1, 4), -np.inf)
-        """Bounding sphere of each part of the gripper, whose spheres are inflated"""
+        self.cluster_ranges: FloatArray = np.zeros((len(self.clusters), 3))
+        """Radius of each cluster's bounding sphere without inflation, and least and largest of `kinematic_m2`"""
+        self.parts: FloatArray = np.zeros((spheres // PART + 1, 4))
+        self.part_ranges: FloatArray = np.zeros((len(self.parts), 3))
+        """The same of each part of the gripper"""
+        self.whole: FloatArray = np.zeros((1, 4))
+        self.whole_range: FloatArray = np.zeros((1, 3))
+        """The same of the whole gripper"""
         self.keys_m: FloatArray = np.zeros(2 * spheres + len(self.clusters) + len(self.parts))
         self.items: IntArray = np.zeros(len(self.keys_m), dtype=np.int64)
         """Queue of one object's parts, clusters and pairs, nearest first; `keys_m` has their keys"""
@@ -149,21 +172,18 @@ class Scratch:
         self.objects: IntArray = np.zeros(objects, dtype=np.int64)
         self.bounds_m: FloatArray = np.zeros(objects)
         """Keys of `objects`, the queue of the objects within the reach, nearest first"""
-        self.next_pieces: IntArray = np.zeros(objects, dtype=np.int64)
-        """The next near piece of the same surface, for each near piece; -1 for the last"""
+        self.near: BoolArray = np.zeros(objects, dtype=np.bool_)
+        """Whether each piece is within the reach"""
         self.first_pieces: IntArray = np.zeros(objects, dtype=np.int64)
-        """First near piece of each surface; -1 for a surface beyond the reach"""
-        self.surface_bounds_m: FloatArray = np.zeros(objects)
-        """Key of each surface, the least of its pieces'"""
-        self.surface_volumes_m3: FloatArray = np.zeros(objects)
-        """Volume of each surface"""
+        """Place of each surface's first piece among the scene's pieces"""
+        self.of_surfaces: FloatArray = np.zeros((objects, len(OfSurface)))
+        """Numbers of each surface, indexed by `OfSurface`"""
         self.rows: IntArray = np.zeros(primitives, dtype=np.int64)
         """Rows of the present object's primitives within the reach"""
         self.row_bounds: FloatArray = np.zeros((primitives, 4))
         """Centre and radius around each of them"""
         self.row_blocks: FloatArray = np.zeros((primitives // ROWS_TOGETHER + 1, 4))
         """Centre and radius around each block of them"""
-        self.no_inflation: FloatArray = np.zeros((primitives, 1))
         self.entries: np.ndarray = np.zeros(primitives, dtype=ENTRY)
         self.samples: FloatArray = np.zeros((SAMPLES + 1, 2))
         """Kept samples of an overlap profile over the margin: V and dV/dE"""

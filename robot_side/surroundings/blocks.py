@@ -15,6 +15,7 @@ from robot_side.surroundings.bounds import around
 
 TOGETHER: Final = 64
 """Number of objects in a block, and of blocks in a group"""
+_CELL_M: Final = 0.005
 _CELLS: Final = 1 << 16
 """Number of cells along each axis, in which the curve orders the positions"""
 
@@ -34,10 +35,17 @@ def in_blocks(object_bounds: FloatArray) -> IntArray:
     with np.errstate(invalid="ignore", divide="ignore"):
         cells = np.nan_to_num((centers_m - low) / extent * (_CELLS - 1))
     cells = np.clip(cells, 0, _CELLS - 1).astype(np.uint64)
-    places = np.zeros(len(there), dtype=np.uint64)
-    for axis in range(3):
-        places |= _spread(cells[:, axis]) << np.uint64(axis)
-    return there[np.lexsort((places, ~endless))]
+    return there[np.lexsort((_on_curve(cells), ~endless))]
+
+
+def places_on_curve(points_m: FloatArray) -> np.ndarray:
+    """Return the place (n,) of each point (n, 3) on a space-filling curve, which is the same for all points."""
+    cells = np.floor(points_m / _CELL_M).astype(np.int64).astype(np.uint64) & np.uint64(_CELLS - 1)
+    return _on_curve(cells)
+
+
+def _on_curve(cells: np.ndarray) -> np.ndarray:
+    return _spread(cells[:, 0]) | _spread(cells[:, 1]) << np.uint64(1) | _spread(cells[:, 2]) << np.uint64(2)
 
 
 def _spread(numbers: np.ndarray) -> np.ndarray:

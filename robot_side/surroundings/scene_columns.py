@@ -23,6 +23,7 @@ class SceneColumns(NamedTuple):
     object_bounds: FloatArray
     object_volumes: FloatArray
     surfaces: IntArray
+    pieces: IntArray
     object_order: IntArray
     ordered_bounds: FloatArray
     block_bounds: FloatArray
@@ -33,7 +34,7 @@ class SceneColumns(NamedTuple):
 
 SCENE: Final = Declared(
     SceneColumns,
-    *(rows(4), rows(SHAPE_NUMBERS), INDICES, INDICES, rows(4), NUMBERS, INDICES),
+    *(rows(4), rows(SHAPE_NUMBERS), INDICES, INDICES, rows(4), NUMBERS, INDICES, INDICES),
     *(INDICES, rows(4), rows(4), rows(4), INDICES, BUNDLED),
 )
 _mesh_contact, _mesh_crossings = call_at_address(MESH_CONTACT, CONTACT), call_at_address(INT64, CROSSINGS)

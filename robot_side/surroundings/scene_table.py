@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from common.arrays import FloatArray, IntArray
-from robot_side.surroundings.blocks import Blocks
+from robot_side.surroundings.blocks import Blocks, places_on_curve
 from robot_side.surroundings.kinds.kind import Placed
 from robot_side.surroundings.kinds.layout import MESH, VELOCITY
 from robot_side.surroundings.perceived import KINDS, PerceivedObjects, SomeObjects
@@ -69,6 +69,9 @@ class SceneTable:
         self.block_bounds, self.group_bounds = self.blocks.blocks, self.blocks.groups
         self.surfaces: IntArray = np.empty(0, dtype=np.int64)
         """(k,) number of the surface that each object is a piece of, see `PerceivedObjects`; (0,) if all stand alone"""
+        self.pieces: IntArray = np.empty(0, dtype=np.int64)
+        """(k,) objects that are pieces of surfaces, surface after surface, those of one along a curve; then -1; (0,) as
+        above"""
         self.follow_surfaces()
 
     def follow_surfaces(self) -> None:
@@ -77,9 +80,13 @@ class SceneTable:
         if new is None or len(new) == len(self.surfaces):
             self.surfaces[:] = -1 if new is None else new
         else:
-            self.surfaces = new.copy()
-            # The bundle holds the array's address.
+            self.surfaces, self.pieces = new.copy(), np.empty(len(new), dtype=np.int64)
+            # The bundle holds the arrays' addresses.
             vars(self).pop("bundle", None)
+        there = np.flatnonzero(self.surfaces >= 0)
+        self.pieces[len(there) :] = -1
+        order = np.lexsort((places_on_curve(self.object_bounds[there, :3]), self.surfaces[there]))
+        self.pieces[: len(there)] = there[order]
 
     @cached_property
     def kernels(self) -> IntArray:
