@@ -61,13 +61,20 @@ class Ahead:
         self.scratch = Scratch(0, 0, 0)
 
     def look(
-        self, pose: GripperPose, scene: SceneTable, classes: IntArray, along: Along, widest_m: float = np.inf
+        self,
+        pose: GripperPose,
+        scene: SceneTable,
+        classes: IntArray,
+        along: Along,
+        widest_m: float = np.inf,
+        *,
+        full_only: bool = False,
     ) -> Field:
         """Return the field along `along` from `pose`. classes (k,): class of each object (`object_class`).
 
-        widest_m: half the gap between the fingers, the largest inflation of a finger's sphere towards the target. NaN
-        or infinity would compare as far away and silently give no warning. So a ValueError names the field of `pose` or
-        `along` that holds it.
+        widest_m: half the gap between the fingers, the largest inflation of a finger's sphere towards the target.
+        full_only: look for full strength alone, so that the other onset distances are -∞. NaN or infinity would compare
+        as far away and silently give no warning. So a ValueError names the field of `pose` or `along` that holds it.
         """
         objects = len(scene.first_rows) - 1
         approach_m = _STILL if along.approach_m is None else along.approach_m
@@ -83,7 +90,7 @@ class Ahead:
         scratch = self.scratch
         prediction = along.mean_along_m, along.variance_along_m2
         errors = DirectionalErrors(along.mean_m, along.variance_m2, *prediction, along.quantile, along.unseen_m)
-        around = widest_m, along.reach_m, classes, approach_m, of_objects, scene.bundle, scratch.bundle
+        around = widest_m, along.reach_m, classes, approach_m, of_objects, full_only, scene.bundle, scratch.bundle
         found = look(
             *(np.ascontiguousarray(pose.sphere_centers_m), pose.sphere_radii_m, pose.sphere_on_finger),
             *(pose.tool_position_m, np.ascontiguousarray(pose.tool_jacobian), self._encoder_variance),

@@ -220,7 +220,7 @@ def _list_distances(scratch: ScratchColumns, reach: float) -> None:
 
 @compiled(
     *(input_array(2), input_array(1), input_flags(), input_array(1), input_array(2), input_array(1), input_array(1)),
-    *(ERRORS, FLOAT64, FLOAT64, input_indices(), input_array(1), input_array(2), BUNDLE, BUNDLE),
+    *(ERRORS, FLOAT64, FLOAT64, input_indices(), input_array(1), input_array(2), BOOL, BUNDLE, BUNDLE),
     returns=BOOL,
 )
 def look(
@@ -237,6 +237,7 @@ def look(
     classes: IntArray,
     approach: FloatArray,
     of_objects: FloatArray,
+    full_only: bool,
     scene_bundle: IntArray,
     scratch_bundle: IntArray,
 ) -> bool:
@@ -247,11 +248,15 @@ def look(
     largest inflation of a finger's sphere towards the target (§3.4). reach: distance examined. classes (k,): the
     objects' (`object_class`). approach (k,): distance by which each object approaches, subtracted from its contact
     distances; empty if all are at rest. errors: the largest of all objects. of_objects (k, 2): the unseen motion and
-    the variance of each, in place of those in `errors`; empty if all are alike.
+    the variance of each, in place of those in `errors`; empty if all are alike. full_only: look for full strength
+    alone; the others' onset distances are then -∞.
     """
     bundles, scratch = Bundles(scene_bundle, scratch_bundle), scratch_at(scratch_bundle)
     along, margin, spheres = load(direction.reshape(1, 3), 0), MARGIN_M, radii.size
     scratch.distances_m[:], scratch.counts[:] = math.inf, 0
+    if full_only:
+        # No onset can be sooner, so none is looked for.
+        scratch.distances_m[:, : STRENGTHS - 1] = -math.inf
     finite = place_spheres(
         centers, radii, on_finger, load(tool.reshape(1, 3), 0), jacobian, encoder_variance, along, scratch_bundle
     )
@@ -264,7 +269,7 @@ def look(
     count = queue_objects(bundles, classes, approach, along, middle, size, spheres, shorter, reach + 2.0 * margin)
     keys, things, inflated = scratch.bounds_m, scratch.objects, errors
     while count > 0 and keys[0] < _last_to_count(scratch, margin) and _within_budget(scratch, 0):
-        thing, examined = things[0], min(reach, 2.0 * max(keys[0], margin))
+        thing, examined = things[0], reach if keys[0] > 0.0 else min(reach, 2.0 * margin)
         count = drop_first(keys, things, count)
         own = errors_of(bundles, thing, classes, errors, of_objects) if differ else errors
         if own.unseen != inflated.unseen or own.variance != inflated.variance:

@@ -1,5 +1,6 @@
 """Errors of the objects' perceived positions, each object its own (eq. 9-10)."""
 
+from functools import lru_cache
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -27,16 +28,23 @@ def object_errors(objects: PerceivedObjects, uncertainty: Uncertainty) -> FloatA
 
     None if no object has moved unseen, and none has another σ_c than that of `uncertainty`.
     """
+    return _object_errors(objects, uncertainty.camera_sd_m)
+
+
+@lru_cache(maxsize=2)
+def _object_errors(objects: PerceivedObjects, camera_sd_m: float) -> FloatArray | None:
     sds_m, late_s = objects.sds_m, objects.late_s
     if sds_m is None and objects.unseen_m == 0.0 and late_s == 0.0:
         return None
     found: FloatArray = np.empty((len(objects.names), 2))
-    found[:, 0], found[:, 1] = objects.unseen_m, uncertainty.camera_sd_m**2
+    found[:, 0], found[:, 1] = objects.unseen_m, camera_sd_m**2
     if objects.velocities_m_s is not None and late_s > 0.0:
         found[:, 0] += late_s * np.sqrt(np.einsum("ki,ki->k", objects.velocities_m_s, objects.velocities_m_s))
     if sds_m is not None:
         known = ~np.isnan(sds_m)
         found[known, 1] = sds_m[known] ** 2
+    # All looks at a frame share them.
+    found.flags.writeable = False
     return found
 
 

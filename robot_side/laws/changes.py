@@ -43,7 +43,7 @@ def differs(seen: Seen, last: Seen) -> bool:
     now, then = seen.situation, last.situation
     sticks = zip(now.lateral, then.lateral, strict=True)
     return (
-        seen.classes is not last.classes
+        (seen.classes is not last.classes and seen.classes.meant != last.classes.meant)
         or seen.assumed is not last.assumed
         or seen.motion.moves != last.motion.moves
         or len(now.pose.sphere_radii_m) != len(then.pose.sphere_radii_m)

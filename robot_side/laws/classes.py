@@ -16,6 +16,8 @@ class Classes:
 
     roles: object
     held: int | None
+    meant: object
+    """Held object, and roles. Those of a map's surfaces come and go with them: of these the targets alone"""
     usual: IntArray
     closing: IntArray
     """Classes while the fingers move: the target is SKIPPED, because the fingers shall touch it"""
@@ -28,7 +30,10 @@ class Classes:
 def classes_of(objects: PerceivedObjects, held: int | None) -> Classes:
     """Return the classes of a frame's objects. held: index of the held object, if any."""
     of_role = {Role.TARGET: TARGET, Role.IGNORED: SKIPPED, Role.SUPPORT: OBSTACLE if held is None else TOUCHABLE}
-    usual = np.array([of_role.get(role, OBSTACLE) for role in objects.roles], dtype=np.int64)
+    # Roles are hashed slowly, and there may be thousands.
+    of_id = {id(role): of_role.get(role, OBSTACLE) for role in Role}
+    usual = np.fromiter(map(of_id.__getitem__, map(id, objects.roles)), np.int64, len(objects.roles))
     if held is not None:
         usual[held] = SKIPPED
-    return Classes(objects.roles, held, usual, np.where(usual == TARGET, SKIPPED, usual))
+    meant = objects.roles if objects.surfaces is None else tuple(np.flatnonzero(usual == TARGET).tolist())
+    return Classes(objects.roles, held, (held, meant), usual, np.where(usual == TARGET, SKIPPED, usual))

@@ -128,13 +128,15 @@ class Looking:
     def _look_from_probes(self, probes: ProbeLooks, due: list[tuple[int, int]], seen: Seen) -> None:
         for side, number in due:
             there = probe(number, seen.situation.pose, seen.assumed.motion, probes.full_s)
-            probes.add(side, number, *self._one(seen.prospect(side, there), seen)[1:])
+            probes.add(side, number, *self._one(seen.prospect(side, there), seen, full_only=True)[1:])
 
-    def _one(self, found: Prospect, seen: Seen) -> tuple[Field, FloatArray, float, FloatArray]:
+    def _one(
+        self, found: Prospect, seen: Seen, *, full_only: bool = False
+    ) -> tuple[Field, FloatArray, float, FloatArray]:
         """Look; return the field, û, the tool's position along û, and the onset distances (2, 8) from the tool."""
         pose, classes, along, widest_m = found.asked
         # What was too much is not tried again in the same tick.
-        made = self.cut or self.ahead.look(pose, seen.scene, classes, along, widest_m)
+        made = self.cut or self.ahead.look(pose, seen.scene, classes, along, widest_m, full_only=full_only)
         self._done += int(made.counts[Count.PAIRS] + made.counts[Count.OVERLAPS])
         if self.cut is None and self._done > MOST_WORK:
             cut = np.zeros_like(made.counts)

@@ -89,7 +89,7 @@ class SweptLaw:
             probes.advance(now_s)
         if last is None or is_due(seen, last, waits=probes is not None and probes.waits):
             if probes is not None and (
-                last is None or seen.classes is not last.classes or seen.assumed is not last.assumed
+                last is None or seen.classes.meant != last.classes.meant or seen.assumed is not last.assumed
             ):
                 probes.discard()
             self.looking.look(seen, changed=last is None or differs(seen, last) or have_moved(seen, last))

@@ -26,17 +26,16 @@ class MoverRows:
         self.movers = movers
         self.rows = np.flatnonzero(np.isin(table.object_index, movers.things))
         """(n,) rows of the movers' primitives"""
-        kinds = table.kinds[self.rows]
-        self.groups, self.checks = grouped(kinds), NumberChecks(kinds)
-        places = table.blocks.places(movers.things)
-        self.bounded = np.flatnonzero(places >= 0)
-        """Movers that have bounds"""
-        self.places = places[self.bounded]
-        """Their positions in the table's order of blocks"""
-        self.bound_blocks = table.blocks.bound(self.places)
-        sizes = np.diff(table.first_rows)[movers.things]
-        self.solid = bool((np.diff(movers.first_rows) == sizes).all())
+        self.kinds = table.kinds[self.rows]
+        self.places = table.blocks.places(movers.things)
+        """(m,) positions of the movers in the table's order of blocks; -1 for a mover without bounds"""
+        self.sizes = np.diff(movers.first_rows)
+        """(m,) number of each mover's primitives"""
+        self.solid = bool((self.sizes == np.diff(table.first_rows)[movers.things]).all())
         """Whether the table has all of the movers' primitives: none was left out for want of volume"""
+        self.owners = np.repeat(np.arange(len(self.sizes)), self.sizes)
+        self.written = movers.at_first
+        """Numbers of the movers that are in the table"""
 
 
 @dataclass(eq=False)
@@ -158,18 +157,26 @@ def _write_movers(table: SceneTable, moving: MoverRows, numbers: FloatArray) -> 
     numbers (n + m, 20) as in `movers`.
     """
     movers, count = moving.movers, len(moving.rows)
-    own = numbers[:count]
     velocities_m_s = numbers[count:, VELOCITY : VELOCITY + 3]
-    if not moving.checks.valid(own) or (movers.measured and not np.isfinite(velocities_m_s).all()):
+    if movers.measured and not np.isfinite(velocities_m_s).all():
         return False
-    placed = placed_rows(own, moving.groups)
+    # Most of a map's surfaces stay where they are. What is not a number differs from itself.
+    elsewhere = np.zeros(len(movers.things), dtype=np.bool_)
+    elsewhere[moving.owners[(numbers[:count] != moving.written[:count]).any(axis=1)]] = True
+    which, these = np.flatnonzero(elsewhere), np.flatnonzero(elsewhere[moving.owners])
+    own, rows, kinds = numbers[these], moving.rows[these], moving.kinds[these]
+    if not NumberChecks(kinds).valid(own):
+        return False
+    placed = placed_rows(own, grouped(kinds))
     if not (placed.volumes_m3 > 0.0).all():
         return False
-    bounds, volumes = of_objects(placed, movers.first_rows)
-    table.shapes[moving.rows], table.bounds[moving.rows] = placed.shapes, placed.bounds
-    table.object_bounds[movers.things], table.object_volumes[movers.things] = bounds, volumes
-    table.ordered_bounds[moving.places] = bounds[moving.bounded]
-    moving.bound_blocks()
+    things, places = movers.things[which], moving.places[which]
+    bounds, volumes = of_objects(placed, np.concatenate([[0], moving.sizes[which].cumsum()]))
+    table.shapes[rows], table.bounds[rows] = placed.shapes, placed.bounds
+    table.object_bounds[things], table.object_volumes[things] = bounds, volumes
+    table.ordered_bounds[places[places >= 0]] = bounds[places >= 0]
+    table.blocks.bound(places[places >= 0])()
+    moving.written = numbers
     if table.placed is not None:
         places, meshes, *_ = movers.parts["mesh_positions_m"]
         table.placed.positions[meshes] = numbers[places, :3]
