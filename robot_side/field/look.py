@@ -269,7 +269,11 @@ def look(
     count = queue_objects(bundles, classes, approach, along, middle, size, spheres, shorter, reach + 2.0 * margin)
     keys, things, inflated = scratch.bounds_m, scratch.objects, errors
     while count > 0 and keys[0] < _last_to_count(scratch, margin) and _within_budget(scratch, 0):
-        thing, examined = things[0], reach if keys[0] > 0.0 else min(reach, 2.0 * margin)
+        again, overlaps = things[0] < 0, keys[0] <= 0.0
+        entered, limited = scratch.counts[Count.ENTERED], scratch.counts[Count.LIMITED]
+        thing = -1 - things[0] if again else things[0]
+        # An object that never gives full strength, as one beside the gripper, would be followed all the way.
+        examined = min(reach, 2.0 * margin) if overlaps else reach
         count = drop_first(keys, things, count)
         own = errors_of(bundles, thing, classes, errors, of_objects) if differ else errors
         if own.unseen != inflated.unseen or own.variance != inflated.variance:
@@ -279,9 +283,11 @@ def look(
         lead = scratch.along_m[Error.ALONG] + approach_of(bundles, thing, classes, approach)
         rows, volume = keep_pieces(bundles, thing, classes, middle, size, along, examined + 2.0 * margin + lead)
         _look_at(bundles, spheres, rows, volume, thing, classes[thing], lead, along, half_gap, examined, inflated)
-        # An object that never gives full strength, as one beside the gripper, would be followed all the way.
-        if examined < reach and _last_to_count(scratch, 0.0) > examined:
-            count = push(keys, things, count, examined + margin, thing)
+        if again:
+            # These were counted before.
+            scratch.counts[Count.ENTERED], scratch.counts[Count.LIMITED] = entered, limited
+        elif examined < reach and _last_to_count(scratch, 0.0) > examined:
+            count = push(keys, things, count, examined + margin, -1 - thing)
     if not _within_budget(scratch, 0):
         # What was not looked at may be anywhere.
         scratch.counts[Count.CUT], scratch.distances_m[:] = 1, 0.0

@@ -150,7 +150,7 @@ class Scratch:
         self.kinematic_m2: FloatArray = np.zeros((spheres, 1))
         """Variance of each sphere's position from the encoders, along the direction of the look"""
         self.inflation_m: FloatArray = np.zeros((spheres, 1))
-        """Inflation I of each sphere in an examined cluster towards the present object: errors of camera and arm at P"""
+        """Inflation I of each sphere of an examined cluster, towards the present object: by camera and arm, at P"""
         self.sigma_m: FloatArray = np.zeros((spheres, 1))
         """D_σ of each sphere at P, by the largest errors of all objects: errors of camera, arm and prediction"""
         self.clusters: FloatArray = np.zeros((spheres // CLUSTER + 1, 4))
