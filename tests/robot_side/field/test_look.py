@@ -15,8 +15,10 @@ from robot_side.enlargement.distance import Uncertainty
 from robot_side.enlargement.kinematic_error import directional_variance, position_covariance
 from robot_side.field.along import Along
 from robot_side.field.field import Ahead
+from robot_side.field.object_class import OBSTACLE, SKIPPED
 from robot_side.field.scratch import MOST_WORK, Count, Error
-from tests.helpers.field.fields import AHEAD, RADIUS_M, along, ball_pose, look
+from robot_side.surroundings.scene_table import scene_table
+from tests.helpers.field.fields import AHEAD, EQUAL_M, RADIUS_M, along, ball_pose, look
 from tests.helpers.gripper_poses import free_pose, gripper_pose
 from tests.helpers.perceived_scenes import Scene, random_rotation, random_scene
 
@@ -154,3 +156,30 @@ def test_what_is_far_behind_something_swallowed_is_early_and_never_silent() -> N
     objects = scene.box([0.0, 0.0, 0.05], [0.001, 0.001, 0.001]).box([0.0, 0.0, 0.9], [0.5, 0.5, 0.02]).objects()
     found = look(ball_pose(), objects, along(reach_m=3.0))
     assert found.fast_m[0] <= 0.9 - 0.02 - RADIUS_M
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_each_of_many_objects_that_the_enlarged_gripper_overlaps_counts_as_if_it_were_alone(seed: int) -> None:
+    rng, scene = np.random.default_rng(seed), Scene()
+    pose = free_pose(rng.uniform(-0.02, 0.02, (8, 3)), [0.008] * 8)
+    for _ in range(12):
+        scene.add().box(rng.uniform(-0.05, 0.05, 3), rng.uniform(0.001, 0.01, 3), random_rotation(rng))
+    objects, ahead, by = scene.objects(), along(AHEAD, 0.02), Ahead(np.zeros(6))
+    together_m = look(pose, objects, ahead, by=by).fast_m
+    alone_m = []
+    for thing in range(12):
+        classes = [OBSTACLE if one == thing else SKIPPED for one in range(12)]
+        alone_m.append(look(pose, objects, ahead, classes=classes, by=by).fast_m)
+    np.testing.assert_allclose(together_m, np.min(alone_m, axis=0), rtol=0.0, atol=EQUAL_M)
+
+
+def test_of_full_strength_alone_a_look_tells_the_same() -> None:
+    rng = np.random.default_rng(2)
+    pose, scene = free_pose(rng.uniform(-0.02, 0.02, (8, 3)), [0.008] * 8), Scene()
+    for _ in range(20):
+        scene.add().box(rng.uniform(-0.1, 0.1, 3), rng.uniform(0.001, 0.02, 3), random_rotation(rng))
+    table, classes = scene_table(scene.objects()), np.full(20, OBSTACLE, dtype=np.int64)
+    by = Ahead(np.zeros(6))
+    whole, last = (by.look(pose, table, classes, along(AHEAD, 0.01), full_only=only) for only in (False, True))
+    assert np.isfinite(whole.onsets_m[:, -1]).all()
+    np.testing.assert_allclose(last.onsets_m[:, -1], whole.onsets_m[:, -1], rtol=0.0, atol=EQUAL_M)

@@ -84,6 +84,17 @@ def test_the_largest_errors_of_the_pieces_count_for_the_surface() -> None:
     assert (_fast_m(_surface(boxes), pose, None, one) == _fast_m(_surface(boxes), pose, None, all_of_them)).all()
 
 
+def test_the_order_of_blocks_does_not_count() -> None:
+    boxes, pose, rng = _wall(Tiling(0.01, 1e-3, 1e-3)), ball_pose(), np.random.default_rng(3)
+    seen = _surface(boxes)
+    parked = replace(seen, box_centers_m=rng.permutation(seen.box_centers_m))
+    movers, surroundings = Movers(parked, np.arange(len(seen.names))), Surroundings()
+    surroundings.see(parked)
+    frame = movers.frame(1.0, movers.numbers_in(seen), seen.roles, surfaces=seen.surfaces)
+    classes, along = np.full(len(seen.names), OBSTACLE, dtype=np.int64), Along(X, 0.0, 1e-6, 2.3, 0.2)
+    assert (Ahead(np.zeros(6)).look(pose, surroundings.see(frame), classes, along).fast_m == _fast_m(seen, pose)).all()
+
+
 def test_surfaces_change_from_frame_to_frame_of_movers() -> None:
     boxes, pose = _wall(Tiling(0.01)), ball_pose()
     first, whole = boxes.objects(), np.zeros(len(boxes.centers_m), dtype=np.int64)
