@@ -9,7 +9,8 @@ from robot_side.compiled.kernel import building_block, inlined
 
 @inlined
 def _is_before(keys: FloatArray, items: IntArray, place: int, key: float, item: int) -> bool:
-    return keys[place] < key or (keys[place] == key and items[place] < item)
+    before: bool = keys[place] < key or (keys[place] == key and items[place] < item)
+    return before
 
 
 @building_block

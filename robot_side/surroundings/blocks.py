@@ -45,7 +45,10 @@ def places_on_curve(points_m: FloatArray) -> np.ndarray:
 
 
 def _on_curve(cells: np.ndarray) -> np.ndarray:
-    return _spread(cells[:, 0]) | _spread(cells[:, 1]) << np.uint64(1) | _spread(cells[:, 2]) << np.uint64(2)
+    places: np.ndarray = _spread(cells[:, 0])
+    for axis in (1, 2):
+        places = places | _spread(cells[:, axis]) << np.uint64(axis)
+    return places
 
 
 def _spread(numbers: np.ndarray) -> np.ndarray:

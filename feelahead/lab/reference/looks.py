@@ -27,11 +27,18 @@ class _Noting(Ahead):
         self.asked: list[tuple[Asked, PerceivedObjects]] = []
 
     def look(
-        self, pose: GripperPose, scene: SceneTable, classes: IntArray, along: Along, widest_m: float = np.inf
+        self,
+        pose: GripperPose,
+        scene: SceneTable,
+        classes: IntArray,
+        along: Along,
+        widest_m: float = np.inf,
+        *,
+        full_only: bool = False,
     ) -> Field:
         """Look, and note the arguments."""
         self.asked.append((Asked(pose, classes, along, widest_m), scene.objects))
-        return super().look(pose, scene, classes, along, widest_m)
+        return super().look(pose, scene, classes, along, widest_m, full_only=full_only)
 
 
 def looks_of(recorded: Recorded, most: int) -> tuple[list[tuple[Asked, PerceivedObjects]], FloatArray]:
