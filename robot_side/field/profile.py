@@ -103,8 +103,8 @@ def _first_rise(profile: Profile, last: Sample, rises: bool, full: float, bundle
     Return False if no onset distance can become shorter. last: sample at 0. rises: whether any primitive's overlap may
     rise from there. full: smallest rise of the overlap for full strength.
     """
-    scratch, baseline = scratch_at(bundles.scratch), last.volume
-    pair, ball = profile.pair, 4.0 / 3.0 * math.pi * profile.pair.radius**3
+    scratch, baseline, pair = scratch_at(bundles.scratch), last.volume, profile.pair
+    ball = 4.0 / 3.0 * math.pi * profile.pair.radius**3
     disc, step = math.pi * pair.radius * pair.radius, _FINE * profile.margin
     # A rise within rounding does not count.
     if last.slope * _TOLERANCE_M > NOTHING * ball:
@@ -165,13 +165,7 @@ def _most_over_margin(profile: Profile, rise: Rise, middle: Sample, full: Sample
 
 @inlined
 def _take(
-    profile: Profile,
-    level: int,
-    a: Sample,
-    b: Sample,
-    baseline: float,
-    reference: float,
-    bundles: Bundles,
+    profile: Profile, level: int, a: Sample, b: Sample, baseline: float, reference: float, bundles: Bundles
 ) -> int:
     """Shorten the onset distances of the strengths, from `level` on, that begin between two samples.
 
@@ -290,12 +284,11 @@ def _go_on(
     primitive's overlap may rise beyond the last of them.
     """
     scratch, baseline = scratch_at(bundles.scratch), rise.baseline
-    step = profile.margin / SAMPLES
     for k in range(_MOST_SAMPLES):
         if level == STRENGTHS or not matters(profile, level, last.at, scratch.distances_m):
             break
         if k < stored:
-            at = rise.free.at + (k + 1) * step
+            at = rise.free.at + (k + 1) * profile.margin / SAMPLES
             found = Sample(at, scratch.samples[k + 1, 0], scratch.samples[k + 1, 1])
         else:
             comes = next_entry(profile, last.at, scratch)
