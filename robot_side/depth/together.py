@@ -5,6 +5,7 @@ from typing import Final
 import numpy as np
 
 from common.arrays import BoolArray, FloatArray, IntArray
+from common.roles import ROLES
 from robot_side.compiled.kernel import BOOL, compiled, inlined, input_array, input_indices, output_indices
 from robot_side.compiled.vectors import dot, load, norm, subtract
 from robot_side.depth.boxes import Boxes
@@ -19,10 +20,12 @@ _LARGEST_M: Final = 0.2
 
 
 def planes_of(boxes: Boxes) -> IntArray:
-    """Return the number of each box's plane (n,), from 0; neighbours with fronts in one plane share it."""
+    """Return the number of each box's plane (n,), from 0; neighbours of one role with fronts in one plane share it."""
     normals, halves_m = np.ascontiguousarray(boxes.rotations[:, :, 2]), boxes.half_sizes_m
     fronts_m: FloatArray = boxes.centers_m + halves_m[:, 2:] * normals
-    return _pieces(fronts_m, np.linalg.norm(halves_m[:, :2], axis=1), normals, in_planes=True)
+    planes = _pieces(fronts_m, np.linalg.norm(halves_m[:, :2], axis=1), normals, in_planes=True)
+    of_roles: IntArray = np.unique(planes * (len(ROLES) + 1) + boxes.roles, return_inverse=True)[1].astype(np.int64)
+    return of_roles
 
 
 def largest_piece(boxes: Boxes, rows: IntArray) -> BoolArray:

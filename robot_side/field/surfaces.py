@@ -1,7 +1,7 @@
-"""Objects within the reach of a look, nearest first: obstacles of one surface together, all others alone.
+"""Objects within the reach of a look, nearest first: pieces of one surface together, all others alone.
 
 Pieces of one surface share their reference, as a primitive's pieces do: an edge between two pieces is none in reality.
-So each surface is one object of the law, of all its pieces' primitives (docs/feel.md).
+So each surface is one object of the law, of all its pieces' primitives (docs/feel.md). Its pieces are of one class.
 """
 
 import math
@@ -12,7 +12,7 @@ from robot_side.compiled.vectors import Vector
 from robot_side.field.inflation import DirectionalErrors, own_errors
 from robot_side.field.near_rows import bound_rows, first_contact
 from robot_side.field.nearest_first import push
-from robot_side.field.object_class import OBSTACLE, SKIPPED
+from robot_side.field.object_class import SKIPPED
 from robot_side.field.scratch import SCRATCH, Bundles, OfSurface
 from robot_side.surroundings.bounds import passes
 from robot_side.surroundings.kinds.layout import HALF_SPACE
@@ -24,7 +24,7 @@ scene_at, scratch_at = SCENE.at, SCRATCH.at
 @inlined
 def _surface_of(scene: SceneColumns, thing: int, classes: IntArray) -> int:
     """Return the number of the surface that an object is a piece of; -1 for an object that stands alone."""
-    number: int = scene.surfaces[thing] if scene.surfaces.size > 0 and classes[thing] == OBSTACLE else -1
+    number: int = scene.surfaces[thing] if scene.surfaces.size > 0 and classes[thing] != SKIPPED else -1
     return number
 
 
@@ -39,7 +39,7 @@ def _of_same(scene: SceneColumns, place: int, number: int) -> bool:
 def begin_surfaces(
     bundles: Bundles, classes: IntArray, spread_enlarges: bool, approach: FloatArray, of_objects: FloatArray
 ) -> None:
-    """Forget the surfaces of the last look, and fill the numbers of this one's, of all pieces that are obstacles.
+    """Forget the surfaces of the last look, and fill the numbers of this one's.
 
     spread_enlarges: below P = 0.5 a spread makes the enlargement smaller. approach, of_objects: as in a look.
     """
@@ -49,7 +49,7 @@ def begin_surfaces(
         if thing < 0:
             break
         scratch.near[thing] = False
-        if classes[thing] != OBSTACLE:
+        if classes[thing] == SKIPPED:
             continue
         number = scene.surfaces[thing]
         its = scratch.of_surfaces[number]

@@ -1,4 +1,4 @@
-"""Surfaces by their definition: the obstacles of one surface are the primitives of one object."""
+"""Surfaces by their definition: the pieces of one surface are the primitives of one object."""
 
 from dataclasses import replace
 
@@ -6,18 +6,18 @@ import numpy as np
 
 from common.arrays import IntArray
 from robot_side.field.along import Along
-from robot_side.field.object_class import OBSTACLE
+from robot_side.field.object_class import SKIPPED
 from robot_side.surroundings.perceived import KINDS, PerceivedObjects
 
 
 def whole_surfaces(objects: PerceivedObjects, classes: IntArray, along: Along) -> tuple[PerceivedObjects, Along]:
     """Return a frame in which the first piece of each surface has all pieces' primitives, and their largest errors.
 
-    classes (k,): the objects'. Pieces of another class than OBSTACLE stand alone.
+    classes (k,): the objects', one for all pieces of a surface.
     """
     if objects.surfaces is None:
         return objects, along
-    numbers = np.where(classes == OBSTACLE, objects.surfaces, -1)
+    numbers = np.where(classes != SKIPPED, objects.surfaces, -1)
     owners = np.arange(len(classes))
     approach_m = None if along.approach_m is None else along.approach_m.copy()
     of_objects = None if along.of_objects is None else along.of_objects.copy()

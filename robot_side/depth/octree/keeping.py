@@ -18,8 +18,8 @@ _AHEAD: Final = 0.5
 """Distance by which a corner of the front may differ: in m, and in standard deviations of a pixel"""
 _NEARER: Final = 0.8
 """Share of a box's error below which it is written anew"""
-_THICK: Final = 2.0
-"""Cells of which a box is thick, unless it is narrower"""
+_THICK: Final = 1.0
+"""Cells of which a box is thick, unless it is narrower; thicker ones stand out behind a thin wall seen from inside"""
 _LEAST_M: Final = 0.0005
 """Least half size of a box"""
 

@@ -1,4 +1,4 @@
-"""Obstacles of one surface are one object of the law."""
+"""Pieces of one surface are one object of the law."""
 
 from dataclasses import replace
 
@@ -49,14 +49,18 @@ def _fast_m(
 
 @pytest.mark.parametrize("tile_m", [0.01, 0.02])
 @pytest.mark.parametrize("seed", [0, 1])
-def test_a_surface_has_the_field_of_one_object_and_that_of_the_definition(tile_m: float, seed: int) -> None:
-    boxes, pose = _wall(Tiling(tile_m, 1e-3, 1e-3), seed), ball_pose()
-    found_m = _fast_m(_surface(boxes), pose)
-    np.testing.assert_allclose(found_m, _fast_m(_one_object(boxes), pose), rtol=0.0, atol=LATE_M)
-    seen, along = _surface(boxes), Along(X, 0.0, 1e-6, 2.3, 0.2)
-    classes = np.full(len(seen.names), OBSTACLE, dtype=np.int64)
+@pytest.mark.parametrize("its_class", [OBSTACLE, TARGET])
+def test_a_surface_has_the_field_of_one_object_and_that_of_the_definition(
+    tile_m: float, seed: int, its_class: int
+) -> None:
+    boxes, pose, along = _wall(Tiling(tile_m, 1e-3, 1e-3), seed), ball_pose(), Along(X, 0.0, 1e-6, 2.3, 0.2)
+    seen, ahead = _surface(boxes), Ahead(np.zeros(6))
+    classes = np.full(len(seen.names), its_class, dtype=np.int64)
+    found = ahead.look(pose, Surroundings().see(seen), classes, along).onsets_m.copy()
+    one = ahead.look(pose, Surroundings().see(_one_object(boxes)), classes[:1], along).onsets_m
+    np.testing.assert_allclose(found, one, rtol=0.0, atol=LATE_M)
     defined = defined_onsets(pose, seen, classes, along, np.inf, np.zeros(6))
-    np.testing.assert_allclose(found_m, defined.onsets_m[0, 0], rtol=0.0, atol=LATE_M)
+    np.testing.assert_allclose(found, defined.onsets_m[0], rtol=0.0, atol=LATE_M)
 
 
 def test_tiles_of_a_surface_are_felt_as_the_whole_wall_and_objects_of_their_own_too_early() -> None:
@@ -64,16 +68,6 @@ def test_tiles_of_a_surface_are_felt_as_the_whole_wall_and_objects_of_their_own_
     whole_m = _fast_m(flat(MIDDLE_M, LEANING, (0.08, 0.08)).objects(), pose)
     np.testing.assert_allclose(_fast_m(_surface(boxes), pose), whole_m, rtol=0.0, atol=LATE_M)
     assert _fast_m(boxes.objects(), pose)[-1] < whole_m[-1] - 1e-3
-
-
-def test_a_piece_that_is_the_target_stands_alone() -> None:
-    boxes, pose = _wall(Tiling(0.02)), ball_pose()
-    seen = _surface(boxes)
-    classes = np.full(len(seen.names), OBSTACLE, dtype=np.int64)
-    classes[5] = TARGET
-    alone = np.zeros(len(classes), dtype=np.int64)
-    alone[5] = -1
-    assert (_fast_m(seen, pose, classes) == _fast_m(replace(seen, surfaces=alone), pose, classes)).all()
 
 
 def test_the_largest_errors_of_the_pieces_count_for_the_surface() -> None:
