@@ -14,7 +14,7 @@ from robot_side.depth.motion.carrying import Carried
 from robot_side.depth.motion.seer import MotionSeer
 from robot_side.depth.motion.snapshots import snapshot
 from robot_side.depth.octree.planes import Planes
-from robot_side.depth.own_body import own_pixels, within
+from robot_side.depth.own_body import HELD_M, own_pixels, within
 from robot_side.depth.picture import CameraPose, DepthArray, DepthErrors, DepthPicture, LabelArray, OwnBody
 from robot_side.depth.pointing import patch_around
 from robot_side.depth.settings import MapSettings
@@ -60,6 +60,7 @@ class DepthMap:
         self.seen = SeenSpace(settings)
         self.motion = MotionSeer()
         self._carried = Carried(self.surfels)
+        self._holds = False
 
     def integrate(
         self, picture: DepthPicture, pose: CameraPose, body: OwnBody, errors: DepthErrors, camera: int = 0
@@ -77,9 +78,11 @@ class DepthMap:
         merged = self.surfels.integrate(picture, depth_m, facing, own, view, camera)
         self._find_motion(picture, pose, errors, depth_m, facing, own, camera)
         if body.models:
-            rows = self.surfels.shown
-            near = within(self.surfels.table.points_m[rows], body.known(), self.settings.padding_m)
-            self.surfels.forget(rows[near > 0])
+            self._forget(body.known(), self.settings.padding_m)
+        if body.held and not self._holds:
+            # The gripper hides its place until it is far from there.
+            self._forget(body.carried(), HELD_M, Role.TARGET)
+        self._holds = body.held > 0
         self.seen.see(depth_m, view)
         changed = self.planes.follow(self.surfels)
         valid = (measured >= errors.least_m) & (measured <= errors.most_m)
@@ -95,6 +98,13 @@ class DepthMap:
             boxes=self.planes.count,
             changed=changed,
         )
+
+    def _forget(self, solids: OwnBody, near_m: float, role: Role | None = None) -> None:
+        """Remove the surfels near some solids: those of a role, if one is given."""
+        rows, table = self.surfels.shown, self.surfels.table
+        if role is not None:
+            rows = rows[table.roles[rows] == ROLES.index(role)]
+        self.surfels.forget(rows[within(table.points_m[rows], solids, near_m) > 0])
 
     def _find_motion(
         self,
