@@ -7,9 +7,10 @@ import io
 import re
 import signal
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, TypeVar, get_type_hints
+from types import UnionType
+from typing import Any, TypeVar, Union, get_args, get_origin, get_type_hints
 
 import msgspec
 import tyro
@@ -185,8 +186,24 @@ def _refuse_unknown_keys(
             raise ConfigurationError(
                 f"{file}: unknown key {_shortened(prefix + key)!r}; valid: {', '.join(sorted(hints))}" + elsewhere
             )
-        if isinstance(value, dict) and dataclasses.is_dataclass(hints[key]):
-            _refuse_unknown_keys(value, hints[key], file, f"{prefix}{key}.", elsewhere)
+        for place, table, kind in _tables(f"{prefix}{key}", value, hints[key]):
+            _refuse_unknown_keys(table, kind, file, f"{place}.", elsewhere)
+
+
+def _tables(place: str, value: Any, hint: Any) -> Iterator[tuple[str, Mapping[str, Any], Any]]:
+    """Return each table of settings in the value of a key, with its place in the file and its class."""
+    origin, arguments = get_origin(hint), get_args(hint)
+    if origin in (Union, UnionType):
+        for argument in arguments:
+            yield from _tables(place, value, argument)
+    elif origin is dict and isinstance(value, dict):
+        for name, part in value.items():
+            yield from _tables(f"{place}.{name}", part, arguments[1])
+    elif origin is tuple and isinstance(value, list):
+        for number, part in enumerate(value):
+            yield from _tables(f"{place}[{number}]", part, arguments[0])
+    elif isinstance(value, dict) and dataclasses.is_dataclass(hint):
+        yield place, value, hint
 
 
 def _one_line(box: str, program: str, settings_type: type) -> str:

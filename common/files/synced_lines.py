@@ -3,6 +3,7 @@
 import fcntl
 import os
 from collections.abc import Iterable
+from contextlib import ExitStack
 from io import FileIO
 from pathlib import Path
 from typing import Self
@@ -24,9 +25,7 @@ class SyncedLines:
             raise ConfigurationError(f"{flag} {path}: this is no regular file; valid: a new file, or one written here")
         self._file = self._locked(path)
         content = self._file.readall()
-        lines = content.splitlines(keepends=True)
-        self.torn = lines.pop() if lines and not lines[-1].endswith(b"\n") else b""
-        self.lines = tuple(lines)
+        self.lines, self.torn = complete_lines(content)
         self._length_bytes = len(content) - len(self.torn)
 
     def __enter__(self) -> Self:
@@ -49,9 +48,11 @@ class SyncedLines:
         new, content = self._path.with_name(f"{self._path.name}.new"), b"".join(line + b"\n" for line in lines)
         try:
             new.unlink(missing_ok=True)
-            file = self._locked(new)
-            _write(file, content)
-            new.replace(self._path)
+            with ExitStack() as stack:
+                file = stack.enter_context(self._locked(new))
+                _write(file, content)
+                new.replace(self._path)
+                stack.pop_all()
             sync_folder(self._path.parent)
         except OSError as error:
             raise FeelaheadError(f"{self._flag} {self._path}: cannot be written: {error.strerror}") from error
@@ -76,6 +77,12 @@ class SyncedLines:
         except OSError as error:
             raise ConfigurationError(f"{self._flag} {path}: cannot be opened and locked: {error.strerror}") from error
         return file
+
+
+def complete_lines(content: bytes) -> tuple[tuple[bytes, ...], bytes]:
+    """Return the lines of a file with their ends, and the last one apart if it is torn; else b""."""
+    *lines, torn = content.split(b"\n")
+    return tuple(line + b"\n" for line in lines), torn
 
 
 def sync_folder(folder: Path) -> None:

@@ -1,0 +1,1 @@
+"""`feelahead study`: run a study, check its protocol, plan it, report on it."""
