@@ -4,11 +4,12 @@ import dataclasses
 import json
 import re
 import types
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from enum import Enum
 from pathlib import Path
 from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
 
+import msgspec
 from msgspec import Meta
 
 from common.limits import range_in_words
@@ -19,21 +20,52 @@ _LONGEST_VALUE = 100
 def explain(complaint: str, content: Mapping[str, Any], settings_type: type) -> str:
     """Return one line that explains msgspec's `complaint`, its error in converting `content` to `settings_type`."""
     said, _, path = complaint.partition(" - at `$.")
-    keys = re.findall(r"\w+", path.partition("[")[0].rstrip("`"))
-    if not keys:
+    place, value, hint = _followed(re.findall(r"\w+|\[.*?\]", path), content, settings_type)
+    if not place:
         return complaint
-    value: Any = content
-    hint: Any = settings_type
-    for key in keys:
-        settings = get_args(hint)[0] if get_origin(hint) is Annotated else hint
-        value, hint = value[key], get_type_hints(settings, include_extras=True)[key]
     if not said.startswith(("Expected", "Invalid enum value")):
         # A dataclass's error about its fields, which names what is valid.
-        return f"{'.'.join(keys)}: {said}"
+        return f"{place}: {said}"
     shown = json.dumps(value, default=str, ensure_ascii=False)
     if len(shown) > _LONGEST_VALUE:
         shown = f"{shown[:_LONGEST_VALUE]}..."
-    return f"{'.'.join(keys)} = {shown}; valid: {_valid(hint)}"
+    return f"{place} = {shown}; valid: {_valid(hint)}"
+
+
+def _followed(path: Sequence[str], value: Any, hint: Any) -> tuple[str, Any, Any]:
+    """Return place, value and type of what a complaint's path leads to; of values that are no tables, all of them."""
+    place = ""
+    for step in path:
+        if not step.startswith("["):
+            value, hint = value[step], get_type_hints(_bare(hint), include_extras=True)[step]
+            place = f"{place}.{step}" if place else step
+            continue
+        tables = [kind for kind in get_args(_bare(hint)) if dataclasses.is_dataclass(_bare(kind))]
+        if not tables:
+            break
+        table = tables[0]
+        # The complaint has the number of a list's table, but not the name of a table's.
+        names = [name for name, part in value.items() if _fails(part, table)] if isinstance(value, Mapping) else []
+        place += f".{names[0]}" if names else step
+        value, hint = value[names[0] if names else int(step[1:-1])], table
+    return place, value, hint
+
+
+def _bare(hint: Any) -> Any:
+    """Return a type without its notes, and without None."""
+    if get_origin(hint) is Annotated:
+        return _bare(get_args(hint)[0])
+    if get_origin(hint) in (Union, types.UnionType):
+        return _bare(next(argument for argument in get_args(hint) if argument is not type(None)))
+    return hint
+
+
+def _fails(value: object, kind: Any) -> bool:
+    try:
+        msgspec.convert(value, kind)
+    except msgspec.ValidationError:
+        return True
+    return False
 
 
 def _valid(hint: Any) -> str:
