@@ -24,6 +24,10 @@ _COMMANDS: dict[str, tuple[str, str]] = {
     "replay": ("recordings:replay", "show a recording, or compute it again and compare"),
     "export": ("recordings:export", "turn a recording into CSV, Parquet or a LeRobot dataset"),
     "plot": ("recordings:plot", "draw a recording on one page"),
+    "study": (
+        "study.command:study",
+        "a study with people, from a protocol to a report; also with simulated people",
+    ),
     "bench": ("bench_and_try:bench", "measure speed and accuracy, compared with alternatives"),
     "try": (
         "bench_and_try:try_out",

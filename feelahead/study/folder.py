@@ -13,12 +13,14 @@ from feelahead.study.events import Begun, Ended, Event, Withdrew
 from feelahead.study.journal import StudyJournal, read_events
 from feelahead.study.progress import progress_of, require_next, step_after
 from feelahead.study.protocol import Protocol, load_protocol
-from feelahead.study.records import recording_name, unfinished
+from feelahead.study.records import recording_name
 from feelahead.study.steps import Step
 
 PROTOCOL: Final = "protocol.toml"
 JOURNAL: Final = "journal.jsonl"
 TRIALS: Final = "trials"
+UNFINISHED: Final = "unfinished-"
+"""Begin of a recording's name until it is whole"""
 MADE_ANEW: Final = ("trials.parquet", "answers.parquet", "report.html")
 """Files that a report makes from the others"""
 
@@ -75,26 +77,31 @@ class Study:
         """
         progress = progress_of(self.journal.events_of(event.participant), event.participant)
         require_next(self.protocol, progress, event)
+        if isinstance(event, Begun) and (whole := self._whole(event)).exists():
+            raise FeelaheadError(f"{whole}: is there before its trial; valid: a folder with its own recordings alone")
         if isinstance(event, Ended):
-            self._keep(recording_name(event.participant, progress.attempts[-1].begun))
+            self._keep(progress.attempts[-1].begun)
         self.journal.add(event)
         if isinstance(event, Withdrew) and self.protocol.withdrawn == "remove":
             self._remove(event.participant)
 
     def recording(self, begun: Begun) -> Path:
         """Return the file into which an attempt is to be recorded; it gets its own name when the attempt has ended."""
-        return self.folder / TRIALS / unfinished(recording_name(begun.participant, begun))
+        return self._whole(begun).with_name(f"{UNFINISHED}{self._whole(begun).name}")
 
-    def _keep(self, name: str) -> None:
-        trials = self.folder / TRIALS
+    def _whole(self, begun: Begun) -> Path:
+        return self.folder / TRIALS / recording_name(begun)
+
+    def _keep(self, begun: Begun) -> None:
+        recorded, whole = self.recording(begun), self._whole(begun)
         try:
-            if (trials / name).exists() and not (trials / unfinished(name)).exists():
+            if whole.exists() and not recorded.exists():
                 return  # the event could not be written the time before
-            _sync(trials / unfinished(name))
-            (trials / unfinished(name)).replace(trials / name)
-            sync_folder(trials)
+            _sync(recorded)
+            recorded.replace(whole)
+            sync_folder(whole.parent)
         except OSError as error:
-            raise FeelaheadError(f"{trials / name}: cannot be kept: {error.strerror}") from error
+            raise FeelaheadError(f"{whole}: cannot be kept: {error.strerror}") from error
 
     def _recover(self, participant: int) -> None:
         """Finish what the run before had begun to write down: an end, or a removal."""
@@ -103,7 +110,7 @@ class Study:
             self._remove(participant)
         elif progress.open is not None:
             begun = progress.open.begun
-            whole = self.folder / TRIALS / recording_name(participant, begun)
+            whole = self._whole(begun)
             if whole.is_file():
                 ended = Ended(
                     participant=participant,

@@ -42,15 +42,10 @@ class AnswerRecord:
     value: float
 
 
-def recording_name(participant: int, begun: Begun) -> str:
+def recording_name(begun: Begun) -> str:
     """Return the name of an attempt's recording when it is whole, such as p03-t017.mcap, or p03-t017-2.mcap."""
     again = "" if begun.attempt == 1 else f"-{begun.attempt}"
-    return f"p{participant:02d}-{'practice' if begun.practice else 't'}{begun.trial:03d}{again}.mcap"
-
-
-def unfinished(name: str) -> str:
-    """Return the name that a recording has until it is whole."""
-    return f"unfinished-{name}"
+    return f"p{begun.participant:02d}-{'practice' if begun.practice else 't'}{begun.trial:03d}{again}.mcap"
 
 
 def participants_of(events: Iterable[Event]) -> tuple[int, ...]:
@@ -114,7 +109,7 @@ def _record(protocol: Protocol, participant: int, attempt: Attempt, progress: Pr
         seed=planned.seed,
         status=status,
         excluded="practice" if begun.practice and reason is None else reason,
-        recording=recording_name(participant, begun),
+        recording=recording_name(begun),
     )
 
 

@@ -15,6 +15,7 @@ DOCUMENTS: Final = ("README.md", "CONTRIBUTING.md", "SECURITY.md", "Makefile", "
 COMMANDS: Final = [
     *([name] for name in feelahead.main._COMMANDS if name not in ("bench", "try", "keys")),
     *(["keys", action] for action in ("make", "show", "allow", "revoke", "list")),
+    ["study", "plan"],
     *([menu.name, question] for menu in (bench, try_out) for question in menu.questions),
     ["feelahead-robot"],
     ["feelahead-operator"],

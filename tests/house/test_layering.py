@@ -148,7 +148,9 @@ ARROWS = """
     feelahead/containers: common/* feelahead/both_sides
     feelahead/printing: common
     feelahead/lab: common/* robot_side/* operator_side/* feelahead/both_sides feelahead/containers feelahead/printing
+    feelahead/study: common common/command common/files robot_side/drivers/mujoco robot_side/laws/named.py
     feelahead/commands/bench_and_try.py: common common/files feelahead/lab
+    feelahead/commands/study: common common/command feelahead/printing feelahead/study
     feelahead/commands: common/* robot_side/commissioning robot_side/compiled robot_side/depth robot_side/drivers/mujoco
         robot_side/laws/named.py robot_side/laws/paper_settings.py robot_side/settings.py robot_side/viewing
         operator_side/* feelahead/both_sides feelahead/printing feelahead/recordings
