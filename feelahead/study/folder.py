@@ -11,7 +11,7 @@ from common.files.output_file import require_folder
 from common.files.synced_lines import sync_folder
 from feelahead.study.events import Begun, Ended, Event, Withdrew
 from feelahead.study.journal import StudyJournal, read_events
-from feelahead.study.progress import progress_of, require_next, step_after
+from feelahead.study.progress import require_next, step_after
 from feelahead.study.protocol import Protocol, load_protocol
 from feelahead.study.records import recording_name
 from feelahead.study.steps import Step
@@ -68,14 +68,14 @@ class Study:
 
     def next_step(self, participant: int) -> Step:
         """Return what comes next for a participant."""
-        return step_after(self.protocol, progress_of(self.journal.events_of(participant), participant), participant)
+        return step_after(self.protocol, self.journal.progress(participant), participant)
 
     def add(self, event: Event) -> None:
         """Take an event, once it is on the disk.
 
         ValueError if it may not come now; FeelaheadError if it cannot be written. Nothing has happened then.
         """
-        progress = progress_of(self.journal.events_of(event.participant), event.participant)
+        progress = self.journal.progress(event.participant)
         require_next(self.protocol, progress, event)
         if isinstance(event, Begun) and (whole := self._whole(event)).exists():
             raise FeelaheadError(f"{whole}: is there before its trial; valid: a folder with its own recordings alone")
@@ -105,7 +105,7 @@ class Study:
 
     def _recover(self, participant: int) -> None:
         """Finish what the run before had begun to write down: an end, or a removal."""
-        progress = progress_of(self.journal.events_of(participant), participant)
+        progress = self.journal.progress(participant)
         if progress.withdrawn and self.protocol.withdrawn == "remove":
             self._remove(participant)
         elif progress.open is not None:

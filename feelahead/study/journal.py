@@ -1,7 +1,7 @@
 """Journal of a study: its events, each on the disk before the next step."""
 
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Self
@@ -11,6 +11,7 @@ import msgspec
 from common.errors import ConfigurationError
 from common.files.synced_lines import SyncedLines, complete_lines
 from feelahead.study.events import Enrolled, Event, Withdrew
+from feelahead.study.progress import Progress
 from feelahead.study.protocol import Protocol
 
 
@@ -21,7 +22,7 @@ class StudyJournal:
         """Open or create the file; ConfigurationError if it is of another protocol, damaged, or in use."""
         self._first = _first_line(protocol)
         self._events: list[Event] = []
-        self._of: dict[int, list[Event]] = {}
+        self._progress: dict[int, Progress] = {}
         with ExitStack() as stack:
             self._file = stack.enter_context(SyncedLines("journal", path))
             if not self._file.lines and self._first.startswith(self._file.torn):
@@ -39,11 +40,16 @@ class StudyJournal:
     @property
     def participants(self) -> tuple[int, ...]:
         """Numbers of all who have an event, in order"""
-        return tuple(sorted(self._of))
+        return tuple(sorted(self._progress))
 
-    def events_of(self, participant: int) -> Sequence[Event]:
-        """Return the events of one participant in their order."""
-        return tuple(self._of.get(participant, ()))
+    @property
+    def events(self) -> tuple[Event, ...]:
+        """All events in their order"""
+        return tuple(self._events)
+
+    def progress(self, participant: int) -> Progress:
+        """Return the state of a participant after all events."""
+        return self._progress.get(participant, Progress())
 
     def add(self, event: Event) -> None:
         """Write an event and wait for the disk; FeelaheadError if that fails: then it has not happened."""
@@ -59,13 +65,13 @@ class StudyJournal:
             elif isinstance(event, Withdrew):
                 kept.append(msgspec.structs.replace(event, reason=""))  # it may tell who it was
         self._file.replace([self._first, *map(msgspec.json.encode, kept)])
-        self._events, self._of = [], {}
+        self._events, self._progress = [], {}
         self._remember(kept)
 
     def _remember(self, events: Iterable[Event]) -> None:
         for event in events:
             self._events.append(event)
-            self._of.setdefault(event.participant, []).append(event)
+            self._progress[event.participant] = self.progress(event.participant).after(event)
 
 
 def read_events(path: Path, protocol: Protocol) -> tuple[Event, ...]:

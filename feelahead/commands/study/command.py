@@ -17,7 +17,6 @@ from common.limits import Limited
 from feelahead.printing.figures import shown
 from feelahead.study.balance import ANSWER_S, delay_places, follows, most_minutes, places, whole_square
 from feelahead.study.folder import Study
-from feelahead.study.progress import progress_of
 from feelahead.study.protocol import Protocol, load_protocol
 from feelahead.study.schedule import schedule
 from feelahead.study.steps import public
@@ -144,7 +143,7 @@ def _checked(protocol: Protocol) -> Iterator[RenderableType]:
 def _progress(opened: Study) -> RenderableType:
     rows = []
     for number in opened.journal.participants:
-        progress = progress_of(opened.journal.events_of(number), number)
+        progress = opened.journal.progress(number)
         faults = sum(one.status != "complete" for one in progress.attempts)
         step = public(opened.next_step(number))["step"]
         rows.append((str(number), len(progress.complete), faults, step))
