@@ -92,11 +92,16 @@ def study(arguments: Sequence[str]) -> int:
 
 
 def _run(settings: StudySettings) -> None:
-    protocol, folder = _given(settings.protocol, "PROTOCOL.toml"), _given(settings.out, "--out DIR")
+    protocol = _given(settings.protocol, "PROTOCOL.toml")
+    if not protocol.is_file():
+        raise ConfigurationError(f"study {protocol}: no such action or file; valid: check, plan, report or a protocol")
+    folder = _given(settings.out, "--out DIR")
     with Study(folder, protocol) as opened:
         if settings.simulated is not None:
             _late("trials.simulated").run_simulated(opened, settings.simulated, settings.workers)
         _print(iter([_progress(opened)]))
+        if settings.simulated is None:
+            sys.stdout.write("No page for people is built yet; valid: --simulated N\n")
 
 
 def _plan(settings: PlanSettings) -> None:
