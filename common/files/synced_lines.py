@@ -53,11 +53,11 @@ class SyncedLines:
                 _write(file, content)
                 new.replace(self._path)
                 stack.pop_all()
+            self._file.close()
+            self._file, self._length_bytes = file, len(content)
             sync_folder(self._path.parent)
         except OSError as error:
             raise FeelaheadError(f"{self._flag} {self._path}: cannot be written: {error.strerror}") from error
-        self._file.close()
-        self._file, self._length_bytes = file, len(content)
 
     def _locked(self, path: Path) -> FileIO:
         try:

@@ -73,7 +73,8 @@ class Study:
     def add(self, event: Event) -> None:
         """Take an event, once it is on the disk.
 
-        ValueError if it may not come now; FeelaheadError if it cannot be written. Nothing has happened then.
+        ValueError if it may not come now; FeelaheadError if it cannot be written. Nothing has happened then. But data
+        of a withdrawal that cannot be removed yet are removed at the next start.
         """
         progress = self.journal.progress(event.participant)
         require_next(self.protocol, progress, event)
@@ -114,7 +115,7 @@ class Study:
             if whole.is_file():
                 ended = Ended(
                     participant=participant,
-                    at_s=whole.stat().st_mtime,
+                    at_s=begun.at_s,  # nobody has seen when
                     trial=begun.trial,
                     attempt=begun.attempt,
                     practice=begun.practice,
