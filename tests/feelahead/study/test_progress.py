@@ -52,6 +52,17 @@ def test_a_session_has_its_steps_in_their_order() -> None:
     ]
 
 
+def test_without_practice_rest_and_questions_there_are_trials_alone() -> None:
+    of = protocol(practice=None, rest=None, items=[])
+    assert _names(of, _driven(of)) == ["enrol", "consent", *["trial"] * 8, "done"]
+
+
+def test_of_a_trial_nothing_is_shown_but_its_number() -> None:
+    for kind, of in ((Practice, 4), (Trial, 4)):
+        step = next_step(OF, _driven(OF, until=kind), 1)
+        assert public(step) == {"step": kind.__name__.lower(), "number": 1, "attempt": 1, "of": of}
+
+
 @pytest.mark.parametrize(
     ("successes", "reached", "tries"),
     [
