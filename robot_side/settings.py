@@ -140,7 +140,7 @@ class RobotSettings(PaperFlags, SideOptions):
     law: Annotated[str, tyro.conf.arg(metavar="NAME|FILE.py")] = "swept"
     """Law from which stiffness follows. swept: stiffness along the direction of each trigger, early enough to release
     the trigger in time. paper: the paper's own law, for comparison. paper-isotropic: its printed form, with the same
-    stiffness for both triggers. FILE.py: a law of your own (docs/python.md)."""
+    stiffness for both triggers. margin: the same at a fixed distance. FILE.py: a law of your own (docs/python.md)."""
     assist: Assist = "none"
     """Help besides stiffness, which a strong finger can overcome. speed: the robot side limits the speed along the
     triggers, so that the arm stops where full strength is due, however hard the finger pulls."""

@@ -59,6 +59,8 @@ class Decoder:
             yield from self._message(entry, split_text(rest)[1] if entry.kind == Kind.SENT else rest)
         elif entry.kind == Kind.EPISODE and (self.alone or self._side == "operator"):
             yield _shown("/episode", entry.now_s, {"time_s": entry.now_s, "side": self._side}, _mark(entry))
+        elif entry.kind == Kind.TRUTH:
+            yield Shown("/truth", entry.now_s, entry.content)
         elif entry.kind == Kind.FRAME:
             self._frame_s, flags = FRAME.unpack_from(entry.content)
             if flags & HAS_UNKNOWN and (shares := SHARES.unpack_from(entry.content, FRAME.size)) != self._unseen:

@@ -67,6 +67,8 @@ class Kind(IntEnum):
     """A mark of an episode counts (EpisodeMark of common/episode.py), as JSON; follows from other inputs."""
     MARKED = 20
     """A mark was made away from the controller, as JSON."""
+    TRUTH = 21
+    """What is true in the simulation (Truth of topics.py), as JSON; no core takes it."""
 
 
 class Entry(NamedTuple):

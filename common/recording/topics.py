@@ -12,7 +12,7 @@ import msgspec
 from msgspec import inspect
 
 from common.episode import EpisodeMark
-from common.protocol.messages import MotionCommand, StiffnessUpdate, Telemetry
+from common.protocol.messages import MotionCommand, StiffnessUpdate, Telemetry, Vector3
 from common.protocol.view_messages import EnlargementTerms
 from common.recording.meanings import KEPT, meanings
 from common.recording.wire import BINARY
@@ -74,6 +74,29 @@ class Episode(Moment, frozen=True):
     """Side that recorded the mark"""
     mark: EpisodeMark
     """Mark: start, success, failure, discard or reset"""
+
+
+class Truth(Moment, frozen=True):
+    """What is true in the simulation, which no controller knows. Counts and sums are since the start of the run."""
+
+    armed: bool
+    """Whether the arm follows commands"""
+    tool_m: Vector3
+    """True position of the tool, in the world frame"""
+    obstacle_mm: float | None
+    """Distance from the gripper to the nearest obstacle, negative inside it; None beyond 1 m"""
+    held: str | None
+    """Object that the gripper holds"""
+    hits: int
+    """Contacts of the gripper with all but the target, and of what it holds with obstacles"""
+    hit_first: str | None
+    """Object that was hit first"""
+    fastest_hit_mm_s: float | None
+    """Greatest closing speed of a hit"""
+    impulse_n_s: float
+    """Sum over time of the normal forces of hits, in N s"""
+    placed: bool
+    """Whether the target was lifted and stands by itself"""
 
 
 class Terms(msgspec.Struct, frozen=True):
@@ -151,6 +174,7 @@ TYPES: Final[Mapping[str, type[msgspec.Struct]]] = {
     "/command": _named(MotionCommand, Stamps),
     "/ages": Ages,
     "/episode": Episode,
+    "/truth": Truth,
     "/telemetry": _named(Telemetry, ViewStamps),
     "/enlargement": _named(Terms, ViewStamps),
     "/overlap": Overlaps,

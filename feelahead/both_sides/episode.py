@@ -29,13 +29,13 @@ from operator_side.settings import OperatorSettings
 from operator_side.viewing.pages.driving_page import DrivingPage
 from robot_side.arm.own_arm import moved_by
 from robot_side.compiled.warm_up import warm_up
-from robot_side.core.robot_parts import RobotParts
 from robot_side.core.robot_side import RobotSide
 from robot_side.depth.camera_settings import BY_DEPTH
 from robot_side.drivers.mujoco.scene import Scene, load_scene
 from robot_side.drivers.mujoco.true_contact import TrueContact
 from robot_side.parts import build_parts
 from robot_side.perceiving.own_perception import perceived_by
+from robot_side.recorders import recorders
 from robot_side.settings import RobotSettings
 from robot_side.tick import events
 
@@ -103,9 +103,7 @@ class Episode:
             raise ConfigurationError(f"Episode: {given} is given without {missing}; valid: both, or neither")
         load = self._world or _load
         self.scene = load(robot)
-        parts: RobotParts = build_parts(
-            robot, 1, VIRTUAL_CLOCK, self.scene, law=None if isinstance(self.law, str) else self.law
-        )
+        parts = build_parts(robot, 1, VIRTUAL_CLOCK, self.scene, law=None if isinstance(self.law, str) else self.law)
         self.parts = replace(
             parts,
             camera=perceived_by(None if self.perception == BY_DEPTH else self.perception, parts.camera),
@@ -117,7 +115,7 @@ class Episode:
         notes, listeners = self._recording, [*self._listeners]
         listeners += [] if self._sampler is None else [self._sampler]
         listeners += [self.parts.camera] if isinstance(self.parts.camera, events.Listener) else []
-        robot_side = RobotSide(self.parts, listeners if notes is None else [*listeners, notes.robot])
+        robot_side = RobotSide(self.parts, listeners if notes is None else [*listeners, *recorders(parts, notes.note)])
         warm_up()  # after the scene was loaded, as it decides which kernels are imported
         hearing = [*self._operator_listeners, *([] if notes is None else [notes.operator])]
         operator = build_operator_side(self.operator_settings, 2, VIRTUAL_CLOCK, hearing)

@@ -25,7 +25,10 @@ _FLUSH_BLOCKS: Final = 15
 
 
 class EpisodeRecording:
-    """Recording of both sides. `robot` and `operator` are their listeners; `write` is called at `next_s`."""
+    """Recording of both sides: the robot side's listeners call `note`; `operator` is the other side's listener.
+
+    `write` is called at `next_s`.
+    """
 
     def __init__(
         self,
@@ -42,7 +45,7 @@ class EpisodeRecording:
         require_output_file("record", path)
         require_recordable(path)
         self._noted: tuple[list[Any], list[Any]] = ([], [])
-        self.robot = robot_recorded.RobotRecorder(self._noted[0].append)
+        self.note: Callable[[Any], None] = self._noted[0].append
         self.operator = operator_recorded.OperatorRecorder(self._noted[1].append)
         self._encoders = robot_recorded.RobotEncoder(), operator_recorded.OperatorEncoder()
         self._settings = robot, operator

@@ -25,6 +25,7 @@ from robot_side.drivers.mujoco.robot_model import SiteAxis
 from robot_side.drivers.mujoco.true_contact import TrueContact
 from robot_side.laws.inputs import LawInputs
 from robot_side.laws.paper_settings import PaperSettings
+from robot_side.outcome.hits import Hits
 from robot_side.outcome.placing import Placing
 from robot_side.settings import CameraSettings, RobotSettings
 from robot_side.tick.events import Listener
@@ -35,8 +36,6 @@ Arm = Literal["off", "mechanical", "reacting"]
 """Condition (arm of the experiment). off: no haptics. mechanical: the triggers resist, but the person does not react.
 reacting: the triggers resist and the person reacts."""
 _L2, R2 = 0, 1
-_SAME_CONTACT_S: Final = 0.1
-"""Time in seconds after a contact within which another contact with the same object counts as the same one."""
 SAMPLE_S: Final = 0.05
 """Period at which the person's progress is examined, in seconds"""
 _TRUTH_S: Final = 0.01
@@ -93,13 +92,10 @@ class Watch(Listener):
     """Run of both sides, and what is counted from the simulation's truth in each tick: hits, strengths, placing."""
 
     def __init__(self, trial: Trial, seed: int) -> None:
-        self.hits = 0
-        self.hit_first: str | None = None
-        self.fastest_m_s: float | None = None
+        self.hits = Hits()
         self.pulled_s = self.full_s = 0.0
         """Time for which R2 was pulled, and for which the finger met full strength at R2, in seconds"""
         self.placing = Placing()
-        self._hit_s: dict[str, float] = {}
         self._next_s = -math.inf
         robot = RobotSettings(
             link=trial.link,
@@ -132,17 +128,11 @@ class Watch(Listener):
         )
         self.loopback, self.scene = self.episode.loop, self.episode.scene
         self._contact, self.truth = TrueContact(self.scene), GroundTruth(self.scene)
-        self._parts = {self.scene.model.geom(geom).name for geom in self.scene.robot.gripper_geoms}
 
     def on_sent(self, now_s: float) -> None:
         """Sample the true contacts, the strength under the finger, and the target's position."""
         held, roles = self.loopback.robot.held, self.scene.roles
-        onset = self._contact.update(held)
-        if onset is not None and roles[onset.thing] is not Role.TARGET:
-            # A held object that touches a support is being set down, which is no hit.
-            where_it_should_be = onset.gripper_part not in self._parts and roles[onset.thing] is Role.SUPPORT
-            if not where_it_should_be:
-                self._hit(onset.thing, onset.closing_speed_m_s, now_s)
+        self.hits.take(self._contact.update(held), roles, now_s)
         if now_s >= self._next_s - 1e-9:
             self._next_s = now_s + _TRUTH_S
             strength = self.strength_of(R2)
@@ -151,13 +141,6 @@ class Watch(Listener):
             if (target := self.truth.target()) is not None:
                 is_target = held is not None and roles[held] is Role.TARGET
                 self.placing.observe(target, is_target, self._felt(), now_s)
-
-    def _hit(self, thing: str, speed_m_s: float, now_s: float) -> None:
-        if now_s - self._hit_s.get(thing, -math.inf) > _SAME_CONTACT_S:
-            self.hits += 1
-            self.hit_first = self.hit_first or thing
-        self._hit_s[thing] = now_s
-        self.fastest_m_s = max(speed_m_s, self.fastest_m_s or 0.0)
 
     def _felt(self) -> bool:
         """Return whether a finger meets resistance at a trigger, or the left motor rumbles."""
@@ -184,7 +167,7 @@ def run_trial(trial: Trial, seed: int, sample: Callable[[Watch], None] = lambda 
     the surface on which it was set down.
     """
     watch = Watch(trial, seed)
-    loopback, person = watch.loopback, watch.loopback.person
+    loopback, person, hits = watch.loopback, watch.loopback.person, watch.hits
     assert isinstance(person, SimulatedOperator)  # noqa: S101  # no other is given
     armed_s = done_s = None
     sample(watch)
@@ -202,9 +185,9 @@ def run_trial(trial: Trial, seed: int, sample: Callable[[Watch], None] = lambda 
     grasped = task["time_to_grasp_s"] is not None
     finished = placing["placed"] and done_s is not None and armed_s is not None
     return {
-        "hits": watch.hits,
-        "hit_first": watch.hit_first,
-        "fastest_hit_mm_s": None if watch.fastest_m_s is None else 1e3 * watch.fastest_m_s,
+        "hits": hits.count,
+        "hit_first": hits.first,
+        "fastest_hit_mm_s": None if hits.fastest_m_s is None else 1e3 * hits.fastest_m_s,
         "full_share": watch.full_s / watch.pulled_s if watch.pulled_s else None,
         "grasped": grasped,
         "lifted_mm": task["lifted_mm"],

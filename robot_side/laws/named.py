@@ -40,13 +40,21 @@ def _paper_isotropic(inputs: LawInputs) -> NamedLaw:
     return PaperLaw(inputs, isotropic=True)
 
 
+def _margin(inputs: LawInputs) -> NamedLaw:
+    from robot_side.laws.margin import MarginLaw  # noqa: PLC0415
+
+    return MarginLaw(inputs)
+
+
 LAWS: Final[Mapping[str, Callable[[LawInputs], NamedLaw]]] = {
     "swept": _swept,
     "paper": _paper,
     "paper-isotropic": _paper_isotropic,
+    "margin": _margin,
 }
 """Built-in laws. swept: onset distances along each trigger. paper: the paper's own law (§4.2), one stiffness for each
-trigger. paper-isotropic: its printed form, with the same stiffness for both."""
+trigger. paper-isotropic: its printed form, with the same stiffness for both. margin: the
+paper's with a fixed enlargement."""
 
 
 def make_law(law: object, inputs: LawInputs) -> NamedLaw:

@@ -57,7 +57,11 @@ class RobotEncoder:
         del views  # recorded as they are sent (turns.py)
         if not isinstance(noted, Tick):
             kind, now_s, *content = noted
-            parts = [msgspec.json.encode(*content)] if kind == Kind.EPISODE else [text(content[0]), content[1]]
+            parts = (
+                [msgspec.json.encode(*content)]
+                if kind in (Kind.EPISODE, Kind.TRUTH)
+                else [text(content[0]), content[1]]
+            )
             return now_s, entry(kind, now_s, *parts)
         now_s, state, frame, sent_s, outgoing, _ = noted
         parts = []

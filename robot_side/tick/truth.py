@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from common.arrays import FloatArray
+from common.roles import Role
 
 
 @dataclass(frozen=True)
@@ -45,3 +46,13 @@ class ContactOnset:
     closing_speed_m_s: float
     """Closing speed of the touching points along the contact's normal, before the physics step that
     found the contact"""
+    by_held: bool
+    """Whether that geom is of the held object"""
+
+
+def is_hit(role: Role, *, by_held: bool) -> bool:
+    """Return whether a contact with an object of this role is a hit. by_held: what is held touches, not the gripper.
+
+    The target is to be touched, and a held object that touches a support is being set down.
+    """
+    return role is not Role.TARGET and not (by_held and role is Role.SUPPORT)

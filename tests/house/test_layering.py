@@ -83,7 +83,8 @@ ARROWS = """
         robot_side/arm
         robot_side/operators robot_side/tick
     robot_side/outcome: common robot_side/tick robot_side/tick/truth.py
-    robot_side/recording: common common/recording robot_side/arm robot_side/surroundings robot_side/tick
+    robot_side/recording: common common/protocol common/recording robot_side/arm robot_side/outcome
+        robot_side/surroundings robot_side/tick robot_side/tick/truth.py
     robot_side/laws/named.py: common/files robot_side/laws robot_side/tick
     robot_side/laws/paper_settings.py:
     robot_side/drivers/mujoco/checks: common robot_side/arm robot_side/drivers/mujoco

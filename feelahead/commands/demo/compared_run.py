@@ -78,8 +78,8 @@ class _Samples:
             "resist": (watch.strength_of(R2) or 0) / MAX_STRENGTH,
             "gap_mm": None if gap_m is None else 1e3 * max(gap_m, 0.0),
             "speed_mm_s": 1e3 * moved_m / SAMPLE_S,
-            "hits": watch.hits,
-            "fastest_mm_s": None if watch.fastest_m_s is None else 1e3 * watch.fastest_m_s,
+            "hits": watch.hits.count,
+            "fastest_mm_s": None if watch.hits.fastest_m_s is None else 1e3 * watch.hits.fastest_m_s,
         }
         for name, value in sample.items():
             self.columns[name].append(round(value, 3) if isinstance(value, float) else value)

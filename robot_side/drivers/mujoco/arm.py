@@ -1,6 +1,7 @@
 """Simulated arm: its physics has its own clock, its commands expire, and it measures with sensors' errors."""
 
 import math
+from collections.abc import Callable
 from typing import Final, NamedTuple
 
 import mujoco  # type: ignore[import-untyped]
@@ -78,6 +79,8 @@ class MujocoArm:
         self._taken = 0, 0
         self._clock: Clock | None = None
         self._state: ArmState | None = None
+        self.after_step: Callable[[], object] | None = None
+        """Called after each step of the physics"""
 
         self.travel, self.ends_rad = stand(scene)
         travel = self.travel
@@ -235,6 +238,8 @@ class MujocoArm:
         drive(self._addresses, *self._reference.follows(time_s), closing, self._step_s)
         mujoco.mj_step(self._model, self._data)
         self._steps += 1
+        if self.after_step is not None:
+            self.after_step()
 
     def _measure(self) -> ArmState:
         plant, gripper, encoder = self._plant, self._gripper, self._encoder

@@ -122,7 +122,7 @@ class TrueContact:
             normal, point = sign * np.asarray(contact.frame[:3]), np.asarray(contact.pos)
             closing = (self._velocity(mine, point) - self._velocity(theirs, point)) @ normal
             part = model.geom(mine).name or f"geom{mine}"
-            onsets.append(ContactOnset(self._object_of[theirs], part, float(closing)))
+            onsets.append(ContactOnset(self._object_of[theirs], part, float(closing), mine not in self._gripper))
         return onsets
 
     def _velocity(self, geom: int, point_m: FloatArray) -> FloatArray:
