@@ -1,11 +1,10 @@
 """Impulse of the gripper, and of what it holds, on what they should not touch; only for experiments."""
 
-from typing import Any
-
 import mujoco  # type: ignore[import-untyped]
 import numpy as np
 
-from common.arrays import FloatArray
+from common.arrays import BoolArray, FloatArray
+from common.roles import Role
 from robot_side.drivers.mujoco.scene import Scene
 from robot_side.tick.truth import is_hit
 
@@ -15,32 +14,35 @@ class ContactImpulse:
 
     def __init__(self, scene: Scene) -> None:
         self.impulse_n_s = 0.0
-        self.held: str | None = None
-        """Object that the gripper holds"""
         self._scene = scene
         self._model, self._data = scene.model, scene.data
-        self._object_of = {geom: thing.name for thing in scene.objects for geom in thing.geoms}
-        self._gripper = np.zeros(scene.model.ngeom, dtype=bool)
-        self._gripper[scene.robot.gripper_geoms] = True
-        self._carried = {thing.name: frozenset(thing.geoms) for thing in scene.objects}
+        self._step_s = float(scene.model.opt.timestep)
         self._force: FloatArray = np.zeros(6)
+        self._of: tuple[str | None, tuple[Role, ...]] | None = None
+        self._pairs: BoolArray = np.zeros((0, 0), dtype=np.bool_)
+        """(g, g) whether a contact of two geoms is a hit"""
+        self.look(None)
+
+    def look(self, held: str | None) -> None:
+        """Take the roles as they are now, and the object that the gripper holds."""
+        scene, of = self._scene, (held, tuple(self._scene.roles.values()))
+        if of == self._of:
+            return
+        self._of, count = of, self._model.ngeom
+        ours = dict.fromkeys(map(int, scene.robot.gripper_geoms), False)
+        ours |= {geom: True for thing in scene.objects if thing.name == held for geom in thing.geoms}
+        pairs = np.zeros((count, count), dtype=np.bool_)
+        for thing in scene.objects:
+            for mine, by_held in ours.items():
+                if thing.name != held and is_hit(scene.roles[thing.name], by_held=by_held):
+                    pairs[mine, list(thing.geoms)] = True
+        self._pairs = pairs | pairs.T
 
     def step(self) -> None:
         """Add the impulse of the newest step."""
         if self._data.ncon == 0:
             return
-        contacts, held = self._data.contact, self._carried.get(self.held or "", frozenset())
-        ours = self._gripper[contacts.geom].any(axis=1)
-        if held:
-            ours |= np.isin(contacts.geom, list(held)).any(axis=1)
-        for row in np.flatnonzero(ours):
-            if self._hits(contacts.geom[row], held):
-                mujoco.mj_contactForce(self._model, self._data, row, self._force)
-                self.impulse_n_s += float(self._force[0]) * float(self._model.opt.timestep)
-
-    def _hits(self, pair: Any, held: frozenset[int]) -> bool:
-        for mine, theirs in ((int(pair[0]), int(pair[1])), (int(pair[1]), int(pair[0]))):
-            thing, by_held = self._object_of.get(theirs), mine in held
-            if thing is not None and theirs not in held and (by_held or self._gripper[mine]):
-                return is_hit(self._scene.roles[thing], by_held=by_held)
-        return False
+        first, second = self._data.contact.geom.T
+        for row in np.flatnonzero(self._pairs[first, second]):
+            mujoco.mj_contactForce(self._model, self._data, row, self._force)
+            self.impulse_n_s += float(self._force[0]) * self._step_s

@@ -21,7 +21,7 @@ class SimulationWitness:
 
     def touches(self, held: str | None) -> ContactOnset | None:
         """Return the fastest contact that began since the last call. held: object that the gripper holds."""
-        self._impulse.held = held
+        self._impulse.look(held)
         return self._contact.update(held)
 
     @property
