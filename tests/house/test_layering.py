@@ -151,6 +151,9 @@ ARROWS = """
     feelahead/lab: common/* robot_side/* operator_side/* feelahead/both_sides feelahead/containers feelahead/printing
     feelahead/study: common common/command common/files robot_side/drivers/mujoco robot_side/laws/named.py
     feelahead/commands/bench_and_try.py: common common/files feelahead/lab
+    feelahead/study/trials: common common/recording robot_side/laws/paper_settings.py robot_side/settings.py
+        operator_side operator_side/people operator_side/settings.py feelahead/both_sides feelahead/lab
+        feelahead/printing feelahead/study
     feelahead/commands/study: common common/command feelahead/printing feelahead/study
     feelahead/commands: common/* robot_side/commissioning robot_side/compiled robot_side/depth robot_side/drivers/mujoco
         robot_side/laws/named.py robot_side/laws/paper_settings.py robot_side/settings.py robot_side/viewing

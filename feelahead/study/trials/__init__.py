@@ -1,0 +1,1 @@
+"""Trials of a study: simulated participants, and what came out, from the recordings."""

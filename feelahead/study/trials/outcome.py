@@ -1,0 +1,78 @@
+"""Outcome of a trial, from its recording alone."""
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import msgspec
+import numpy as np
+
+from common.recording.reading import open_recording
+from common.recording.topics import Truth
+
+_TOPIC: Final = "/truth"
+NEAR_MM: Final = 5.0
+"""Distance to an obstacle below which a gripper is exposed"""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What came out of a trial: the columns of the study's table that a recording knows."""
+
+    completed: bool
+    """Whether the target was lifted and put down in time, and stood by itself"""
+    time_s: float | None
+    """Time from arming until it stood; None if it did not"""
+    contacts: int
+    """Contacts of the gripper with all but the target, and of what it held with obstacles"""
+    hit: bool
+    fastest_mm_s: float | None
+    """Greatest closing speed of these contacts"""
+    impulse_n_s: float
+    """Sum over time of their normal forces"""
+    path_m: float
+    """Way of the tool"""
+    least_mm: float | None
+    """Least distance of the gripper from an obstacle, negative inside it; None beyond 1 m"""
+    exposure_s: float
+    """Time for which it was less than NEAR_MM"""
+
+
+def outcome_of(recording: Path, limit_s: float) -> Outcome | None:
+    """Return the outcome of the trial that the file at `recording` has; None if the arm was never armed.
+
+    It ends once the target stands, `limit_s` after arming, or with the recording. ConfigurationError for a file that is
+    no recording, or has no truth, as with an arm that is not simulated.
+    """
+    opened = open_recording(recording)
+    opened.require((_TOPIC,))
+    decode = msgspec.json.Decoder(Truth).decode
+    return outcome([decode(message.content) for message in opened.messages((_TOPIC,))], limit_s)
+
+
+def outcome(truths: list[Truth], limit_s: float) -> Outcome | None:
+    """Return the outcome of a trial with these truths, in order of time; None if the arm was never armed."""
+    first = next((place for place, truth in enumerate(truths) if truth.armed), None)
+    if first is None:
+        return None
+    began_s = truths[first].time_s
+    stood = next((truth.time_s for truth in truths[first:] if truth.placed), None)
+    completed = stood is not None and stood - began_s <= limit_s
+    end_s = stood if completed and stood is not None else began_s + limit_s
+    those = [truth for truth in truths[first:] if truth.time_s <= end_s]
+    before, last = truths[max(first - 1, 0)], those[-1]
+    tool_m = np.array([truth.tool_m for truth in those])
+    times_s = np.array([truth.time_s for truth in those])
+    gaps_mm = np.array([math.inf if truth.obstacle_mm is None else truth.obstacle_mm for truth in those])
+    return Outcome(
+        completed=completed,
+        time_s=end_s - began_s if completed else None,
+        contacts=last.hits - before.hits,
+        hit=last.hits > before.hits,
+        fastest_mm_s=last.fastest_hit_mm_s if last.hits > before.hits else None,
+        impulse_n_s=last.impulse_n_s - before.impulse_n_s,
+        path_m=float(np.linalg.norm(np.diff(tool_m, axis=0), axis=1).sum()),
+        least_mm=None if np.isinf(gaps_mm.min()) else float(gaps_mm.min()),
+        exposure_s=float(np.diff(times_s)[gaps_mm[:-1] < NEAR_MM].sum()),
+    )

@@ -1,0 +1,61 @@
+"""A whole study with simulated participants: the same figures with one and two workers, and after an interruption."""
+
+from pathlib import Path
+
+import pandas
+import pytest
+
+from feelahead.study.events import Begun
+from feelahead.study.folder import Study
+from feelahead.study.trials.simulated import run_simulated
+from feelahead.study.trials.tables import read_tables
+
+PROTOCOL = """
+name = "Small"
+participants = 2
+seed = 5
+controller = "keyboard"
+scenes = ["wall"]
+delays_ms = [0.0]
+trials = 1
+limit_s = 20.0
+items = [{text = "I felt safe."}]
+[conditions.off]
+haptics = false
+[conditions.margin]
+law = "margin"
+margin_m = 0.03
+"""
+
+
+def run(folder: Path, protocol: Path, workers: int) -> tuple[pandas.DataFrame, pandas.DataFrame]:
+    with Study(folder, protocol) as study:
+        run_simulated(study, 2, workers)
+    return read_tables(folder)[1:]
+
+
+@pytest.mark.long
+def test_a_whole_study_gives_the_same_tables_whatever_interrupts_it(tmp_path: Path) -> None:
+    protocol = tmp_path / "small.toml"
+    protocol.write_text(PROTOCOL)
+    trials, answers = run(tmp_path / "two", protocol, 2)
+    assert len(trials) == 4
+    assert set(trials["condition"]) == {"off", "margin"}
+    assert (trials["status"] == "complete").all()
+    assert trials["path_m"].min() > 0.05
+    assert len(answers) == 2 * 2 * 7
+    # A run that was killed in a trial: it is begun again, and the attempt is in the table as a fault.
+    with Study(tmp_path / "killed", protocol) as study:
+        run_simulated(study, 1, 1)
+        first = next(one for one in study.journal.events if isinstance(one, Begun))
+        lines = (tmp_path / "killed" / "journal.jsonl").read_bytes().splitlines(keepends=True)
+    cut = next(place for place, line in enumerate(lines) if b'"begun"' in line) + 1
+    (tmp_path / "killed" / "journal.jsonl").write_bytes(b"".join(lines[:cut]) + b'{"event": "en')
+    for recording in (tmp_path / "killed" / "trials").iterdir():
+        recording.unlink()
+    again, same_answers = run(tmp_path / "killed", protocol, 1)
+    faults = again[again["status"] == "fault"]
+    assert faults[["participant", "trial", "attempt"]].values.tolist() == [[1, first.trial, 1]]
+    complete = again[again["status"] == "complete"].drop(columns=["attempt", "recording"]).reset_index(drop=True)
+    pandas.testing.assert_frame_equal(complete, trials.drop(columns=["attempt", "recording"]))
+    pandas.testing.assert_frame_equal(same_answers, answers)
