@@ -48,7 +48,7 @@ class Condition(Limited):
 
     def __post_init__(self) -> None:
         check_limits(self)
-        require_law(self.law, (*LAWS, MARGIN))
+        require_law(self.law, LAWS)
         if (self.law == MARGIN) != (self.margin_m is not None):
             raise ValueError(f'margin_m = {self.margin_m} with law = "{self.law}"; valid: both margin_m and "{MARGIN}"')
 
