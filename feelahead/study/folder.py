@@ -21,7 +21,7 @@ JOURNAL: Final = "journal.jsonl"
 TRIALS: Final = "trials"
 UNFINISHED: Final = "unfinished-"
 """Begin of a recording's name until it is whole"""
-MADE_ANEW: Final = ("trials.parquet", "answers.parquet", "report.html")
+MADE_ANEW: Final = ("trials.parquet", "answers.parquet", "contrasts.parquet", "cells.parquet", "report.html")
 """Files that a report makes from the others"""
 
 

@@ -66,6 +66,8 @@ class Tables:
     protocol: Protocol
     trials: Any
     answers: Any
+    withdrew: tuple[int, ...] = ()
+    """Numbers of participants who withdrew; if the protocol removes their data, the frames lack them"""
 
     def __post_init__(self) -> None:
         valid = (*OUTCOMES, "participant", "trial", "attempt", "practice", "block", "condition", "delay_ms", "scene")

@@ -53,9 +53,7 @@ def sign_change_p(differences: FloatArray, seed: int) -> float:
     Exact up to 16 participants; above by 65 536 drawn changes of sign.
     """
     moved = differences[differences != 0.0]
-    if len(moved) == 0:
-        return 1.0
-    if len(moved) == 1:
+    if len(moved) < 2:
         return 1.0
     generator = np.random.default_rng(seed)
     found = permutation_test(

@@ -120,23 +120,6 @@ def answered(frame: Any, protocol: Protocol) -> str:
     return embedded(draw, rows, columns, height=2.6 * rows)
 
 
-def power(rows: Any, names: list[str]) -> str:
-    """Return the picture of power against the number of participants, a line for each contrast."""
-
-    def draw(_: Any, axes: Any) -> None:
-        axis = axes[0, 0]
-        for name, colour in zip(names, _cycled(len(names)), strict=True):
-            part = rows[rows.contrast == name]
-            axis.plot(part.participants, 100.0 * part.power, color=colour, marker=".", label=name)
-            axis.fill_between(part.participants, 100.0 * part.low, 100.0 * part.high, color=colour, alpha=0.15)
-        for level in (80, 90):
-            axis.axhline(level, color=_GREY, linewidth=0.8, linestyle=":")
-        axis.set(xlabel="participants", ylabel="power (%)", ylim=(0, 101))
-        axis.legend(fontsize=8, frameon=False, loc="center left", bbox_to_anchor=(1.0, 0.5))
-
-    return embedded(draw)
-
-
 def _whiskers(axis: Any, x: Any, rows: Any, factor: float, colour: str) -> None:
     axis.vlines(x, factor * rows.low, factor * rows.high, color=colour)
     axis.plot(x, factor * rows.value, marker="o", color=colour, linestyle="")

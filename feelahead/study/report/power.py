@@ -11,7 +11,7 @@ from common.arrays import FloatArray
 from common.errors import ConfigurationError
 from feelahead.study.protocol import Contrast, Protocol
 from feelahead.study.report.contrasts import pairs_of
-from feelahead.study.report.outcomes import Tables, measured, outcome_of
+from feelahead.study.report.outcomes import Kind, Tables, measured, outcome_of
 
 LEVEL: Final = 0.05
 ASKED: Final = (0.8, 0.9)
@@ -76,7 +76,7 @@ def plan(
     """Return the power of each contrast of the protocol, by drawing participants from a pool of simulated ones.
 
     In a study without gaps the paired t of participants' means stands for the models: the mixed model with slopes gives
-    the same, estimating equations nearly. tables: the pool's. effects: sizes of the mean effect, each as a share of the
+    the same, linear estimating equations the same with a slightly wider error, others nearly. tables: the pool's. effects: sizes of the mean effect, each as a share of the
     simulated one; differences between participants stay. seed: the protocol's if None. ConfigurationError for a pool or
     sizes that are too small, or without contrasts.
     """
@@ -90,6 +90,12 @@ def plan(
     untold = tuple(one for one in protocol.contrasts if one not in known)
     # What the pool does not tell is a test all the same, and takes its share of the level.
     families = [one.correct for one in (*known, *untold)]
+    estimating = np.array([[outcome_of(one.outcome).kind in (Kind.SHARE, Kind.AMOUNT)] for one in known])
+
+    def errors(size: int) -> FloatArray:
+        """Return by what the models' standard errors are wider: Mancl's and DeRouen's covariance."""
+        return np.where(estimating, np.sqrt(size / (size - 1)), 1.0)
+
     generator = np.random.default_rng(protocol.seed if seed is None else seed)
     rows = []
     for effect in effects:
@@ -97,7 +103,7 @@ def plan(
         assumed = differences - (1.0 - effect) * middles
         for size in sizes:
             drawn = generator.integers(differences.shape[1], size=(resamples, size))
-            raw = np.concatenate([_paired_t_p(assumed[:, drawn]), np.ones((len(untold), resamples))])
+            raw = np.concatenate([_paired_t_p(assumed[:, drawn], errors(size)), np.ones((len(untold), resamples))])
             for contrast, p in zip(known, _holm(raw, families), strict=False):
                 count = int(np.count_nonzero(p <= LEVEL))
                 interval = binomtest(count, resamples).proportion_ci(0.95, method="exact")
@@ -107,7 +113,7 @@ def plan(
 
 
 def _differences(tables: Tables) -> tuple[tuple[Contrast, ...], FloatArray]:
-    """Return the contrasts that the pool's outcomes tell, and differences, shape (contrasts, the pool's participants)."""
+    """Return the contrasts that the pool's outcomes tell, and differences, shape (contrasts, pool)."""
     import pandas as pd  # noqa: PLC0415
 
     found: dict[Contrast, Any] = {}
@@ -122,12 +128,15 @@ def _differences(tables: Tables) -> tuple[tuple[Contrast, ...], FloatArray]:
     return tuple(found), complete.to_numpy(np.float64).T
 
 
-def _paired_t_p(differences: FloatArray) -> FloatArray:
-    """Return Student's two-sided p over the last axis; 1 where all differences are zero."""
+def _paired_t_p(differences: FloatArray, wider: FloatArray) -> FloatArray:
+    """Return Student's two-sided p over the last axis; 1 where all differences are zero.
+
+    differences: (contrasts, resamples, participants). wider: factors of the standard error, (contrasts, 1).
+    """
     count = differences.shape[-1]
     middles, spreads = differences.mean(axis=-1), differences.std(axis=-1, ddof=1)
     with np.errstate(divide="ignore", invalid="ignore"):
-        p = 2.0 * t.sf(np.abs(middles) / spreads * np.sqrt(count), count - 1)
+        p = 2.0 * t.sf(np.abs(middles) / (wider * spreads) * np.sqrt(count), count - 1)
     return np.where(np.isnan(p), 1.0, p)
 
 

@@ -62,14 +62,13 @@ def _interval(outcome: Outcome, means: Any, seed: int) -> tuple[float, float]:
 def flow(tables: Tables, found: tuple[Compared, ...]) -> tuple[tuple[str, int], ...]:
     """Return the flow of participants and trials: what is counted, and its number."""
     trials = tables.trials
-    withdrew = trials[trials.status == "withdrawn"].participant.nunique()
     real = trials[~trials.practice.astype(bool)]
     counted = [one.effect.participants for one in found]
     contrasts = (("participants in the contrast with fewest", min(counted)),) if counted else ()
     return (
         ("participants planned", tables.protocol.participants),
-        ("participants who began", trials.participant.nunique()),
-        ("participants who withdrew", withdrew),
+        ("participants who began", len({*trials.participant, *tables.withdrew})),
+        (f"participants who withdrew (data: {tables.protocol.withdrawn})", len(tables.withdrew)),
         ("participants with trials that count", tables.analysed.participant.nunique()),
         *contrasts,
         ("trials of practice", int(trials.practice.astype(bool).sum())),

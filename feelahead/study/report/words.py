@@ -98,14 +98,14 @@ def models(protocol: Protocol) -> tuple[str, ...]:
         Kind.AMOUNT: "An amount that is zero in many trials is compared by a log-linear model of generalized estimating"
         " equations. Where a condition, delay or scene has zeros alone, a linear one takes its place. Effect: the"
         " difference of means.",
-        Kind.FACTOR: "A time or path is compared by a mixed linear model of its logarithm. A trial that is not completed"
+        Kind.FACTOR: "A time or path is compared by a mixed linear model of its logarithm. A trial not completed"
         f" counts with the limit of {protocol.limit_s:g} s. Effect: the ratio of geometric means.",
         Kind.PLAIN: "A distance or speed is compared by a mixed linear model. Effect: the difference of means.",
         Kind.ANSWER: "Answers are compared by a paired t test, as each participant gives one for each condition.",
     }
     fixed = (
         "Fixed effects are condition, delay and scene, in the rows of a contrast’s two conditions alone.",
-        "Estimating equations have an exchangeable correlation within participants, and Mancl’s and DeRouen’s covariance.",
+        "Estimating equations have an exchangeable correlation within participants; Mancl’s and DeRouen’s covariance.",
         "Mixed models have an intercept and a slope of the condition for each participant; without convergence the"
         " intercept alone.",
         "All are judged by Student’s t with one degree of freedom less than participants.",
