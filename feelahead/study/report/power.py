@@ -76,9 +76,9 @@ def plan(
     """Return the power of each contrast of the protocol, by drawing participants from a pool of simulated ones.
 
     In a study without gaps the paired t of participants' means stands for the models: the mixed model with slopes gives
-    the same, linear estimating equations the same with a slightly wider error, others nearly. tables: the pool's. effects: sizes of the mean effect, each as a share of the
-    simulated one; differences between participants stay. seed: the protocol's if None. ConfigurationError for a pool or
-    sizes that are too small, or without contrasts.
+    the same, linear estimating equations the same with a slightly wider error, others nearly. tables: the pool's.
+    effects: sizes of the mean effect, each as a share of the simulated one; differences between participants stay.
+    seed: the protocol's if None. ConfigurationError for a pool or sizes that are too small, or without contrasts.
     """
     protocol = tables.protocol
     sizes = balanced_sizes(protocol) if sizes is None else sizes

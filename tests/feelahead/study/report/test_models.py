@@ -33,7 +33,7 @@ def test_the_logistic_model_gives_the_tables_odds_ratio() -> None:
     found = fit(balanced(values), Kind.SHARE, "a")
     assert (found.model, found.measure, found.note) == ("logistic GEE", "odds ratio", "")
     assert found.estimate == pytest.approx(first / (1 - first) / (second / (1 - second)), rel=1e-5)
-    assert fit(balanced(values), Kind.SHARE, "b").estimate == pytest.approx(1.0 / found.estimate, rel=1e-5)
+    assert fit(balanced(values), Kind.SHARE, "b").estimate == pytest.approx(1.0 / (found.estimate or 0.0), rel=1e-5)
 
 
 def test_the_log_linear_model_gives_the_ratio_of_means() -> None:
