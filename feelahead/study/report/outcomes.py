@@ -89,7 +89,10 @@ def outcome_of(name: str) -> Outcome:
     """Return the outcome of a trial, the raw score of NASA-TLX, or the answers to the item of this name."""
     if name in OUTCOMES:
         return OUTCOMES[name]
-    return Outcome(name, "workload (raw NASA-TLX)" if name == RAW_TLX else f"“{name}”", Kind.ANSWER)
+    if name == RAW_TLX:
+        return Outcome(name, "workload (raw NASA-TLX)", Kind.ANSWER)
+    scales = {question.name for question in NASA_TLX}
+    return Outcome(name, name.removeprefix("tlx ") if name in scales else f"“{name}”", Kind.ANSWER)
 
 
 def measured(tables: Tables, outcome: Outcome) -> Any:
