@@ -22,6 +22,9 @@ class _Event(msgspec.Struct, frozen=True, kw_only=True, tag_field="event", tag=s
 class Enrolled(_Event, frozen=True):
     """The participant has a number."""
 
+    simulated: bool = False
+    """Whether this is a simulated person"""
+
 
 class Consented(_Event, frozen=True):
     """The participant has signed."""

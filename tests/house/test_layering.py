@@ -149,7 +149,8 @@ ARROWS = """
     feelahead/containers: common/* feelahead/both_sides
     feelahead/printing: common
     feelahead/lab: common/* robot_side/* operator_side/* feelahead/both_sides feelahead/containers feelahead/printing
-    feelahead/study/report: common common/files common/recording feelahead/lab feelahead/study
+    feelahead/study/report: common common/files common/recording feelahead/lab feelahead/printing feelahead/study
+        feelahead/study/trials
     feelahead/study: common common/command common/files robot_side/drivers/mujoco robot_side/laws/named.py
     feelahead/commands/bench_and_try.py: common common/files feelahead/lab
     feelahead/study/trials: common common/recording robot_side/laws/paper_settings.py robot_side/settings.py

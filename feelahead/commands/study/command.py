@@ -85,7 +85,8 @@ def study(arguments: Sequence[str]) -> int:
             _plan(parse_settings(PlanSettings, "feelahead study plan", rest))
         case ["report", *rest]:
             folder = _given(parse_settings(ReportSettings, "feelahead study report", rest).folder, "DIR")
-            sys.stdout.write(f"{_late('report.page').report(folder)}\n")
+            tables = _late("report.reading").read_tables(folder)
+            sys.stdout.write(f"{_late('report.writing').write_report(tables, folder)}\n")
         case _:
             _run(parse_settings(StudySettings, "feelahead study", arguments))
     return 0
@@ -108,7 +109,7 @@ def _plan(settings: PlanSettings) -> None:
     protocol = load_protocol(_given(settings.protocol, "PROTOCOL.toml"))
     planned = None
     if settings.pool is not None:
-        planned = _late("report.power").plan(_late("trials.tables").read_tables(settings.pool))
+        planned = _late("report.power").plan(_late("report.reading").read_tables(settings.pool))
     sys.stdout.write(_late("report.preregistration").preregistration(protocol, planned))
 
 

@@ -68,6 +68,8 @@ class Tables:
     answers: Any
     withdrew: tuple[int, ...] = ()
     """Numbers of participants who withdrew; if the protocol removes their data, the frames lack them"""
+    simulated: bool = False
+    """Whether no people took part, which the page says"""
 
     def __post_init__(self) -> None:
         valid = (*OUTCOMES, "participant", "trial", "attempt", "practice", "block", "condition", "delay_ms", "scene")

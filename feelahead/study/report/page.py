@@ -35,11 +35,11 @@ figcaption, .small { color: #555; font-size: 13px } .said { background: #fff3cd;
 _PACKAGES: Final = ("statsmodels", "scipy", "numpy", "pandas")
 
 
-def page(tables: Tables, found: tuple[Compared, ...], *, simulated: bool) -> str:
-    """Return the page; the same tables give the same text. simulated: whether no people took part."""
+def page(tables: Tables, found: tuple[Compared, ...]) -> str:
+    """Return the page; the same tables give the same text."""
     name = escape(tables.protocol.name)
     sections = (
-        _summary(tables, found, simulated=simulated),
+        _summary(tables, found),
         _contrasts(tables, found),
         _front(tables),
         _exploratory(tables),
@@ -47,7 +47,7 @@ def page(tables: Tables, found: tuple[Compared, ...], *, simulated: bool) -> str
         _order(tables),
         _flow(tables, found),
         _methods(tables),
-        _limits(simulated=simulated),
+        _limits(simulated=tables.simulated),
     )
     return (
         f'<!DOCTYPE html>\n<html lang="en">\n<head><meta charset="utf-8"><title>{name}: report</title>'
@@ -56,7 +56,7 @@ def page(tables: Tables, found: tuple[Compared, ...], *, simulated: bool) -> str
     )
 
 
-def _summary(tables: Tables, found: tuple[Compared, ...], *, simulated: bool) -> str:
+def _summary(tables: Tables, found: tuple[Compared, ...]) -> str:
     asked = tables.protocol
     warning = "Simulated participants: no person took part. These figures say nothing about people."
     facts = (
@@ -66,7 +66,7 @@ def _summary(tables: Tables, found: tuple[Compared, ...], *, simulated: bool) ->
     said = [sentence(one) for one in found]
     return (
         f'<p class="small">{escape(facts)}</p>'
-        + (f'<p class="said">{warning}</p>' if simulated else "")
+        + (f'<p class="said">{warning}</p>' if tables.simulated else "")
         + "<h2>What was found</h2>"
         + (_listed(said) if said else "<p>The protocol plans no contrast.</p>")
     )

@@ -21,11 +21,10 @@ def require_extra(what: str) -> None:
     require_packages(what, *EXTRA, extra="study")
 
 
-def write_report(tables: Tables, folder: Path, *, simulated: bool) -> Path:
+def write_report(tables: Tables, folder: Path) -> Path:
     """Write report.html, and trials, answers, contrasts and cells as Parquet, into `folder`; return the page's path.
 
-    The same tables give the same bytes. simulated: whether no people took part, which the page says. ConfigurationError
-    if a package is missing or a file cannot be written.
+    The same tables give the same bytes. ConfigurationError if a package is missing or a file cannot be written.
     """
     require_extra("study report")
     import pandas as pd  # noqa: PLC0415
@@ -44,5 +43,5 @@ def write_report(tables: Tables, folder: Path, *, simulated: bool) -> Path:
         except OSError as error:
             raise ConfigurationError(f"study report {path}: cannot be written: {error.strerror or error}") from error
     with output_file("study report", folder / PAGE) as file:
-        file.write(page(tables, found, simulated=simulated))
+        file.write(page(tables, found))
     return folder / PAGE

@@ -85,7 +85,7 @@ class _Participation:
             event: Event
             match study.next_step(number):
                 case Enrol():
-                    event = Enrolled(participant=number, at_s=self._at_s)
+                    event = Enrolled(participant=number, at_s=self._at_s, simulated=True)
                 case Consent():
                     event = Consented(participant=number, at_s=self._at_s)
                 case Pause():

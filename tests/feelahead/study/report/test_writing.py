@@ -32,9 +32,9 @@ def tables() -> Tables:
 
 def test_the_page_has_everything_inside_and_the_same_bytes_again(tables: Tables, tmp_path: Path) -> None:
     (tmp_path / "again").mkdir()
-    page = write_report(tables, tmp_path, simulated=True)
+    page = write_report(replace(tables, simulated=True), tmp_path)
     text = page.read_text(encoding="utf-8")
-    assert write_report(tables, tmp_path / "again", simulated=True).read_bytes() == page.read_bytes()
+    assert write_report(replace(tables, simulated=True), tmp_path / "again").read_bytes() == page.read_bytes()
     assert {path.name for path in tmp_path.glob("*.*")} == {*MADE_ANEW}
     assert set(re.findall(r'(?:src|href)="([^,"]*)', text)) == {"data:image/svg+xml;base64"}
     assert text.count("<img") == 4
@@ -42,7 +42,7 @@ def test_the_page_has_everything_inside_and_the_same_bytes_again(tables: Tables,
     assert "<phone>" not in text
     assert "a &lt;phone&gt; rang" in text
     assert "Simulated participants" in text
-    assert "Simulated participants" not in write_report(tables, tmp_path, simulated=False).read_text(encoding="utf-8")
+    assert "Simulated participants" not in write_report(tables, tmp_path).read_text(encoding="utf-8")
     contrasts = pd.read_parquet(tmp_path / "contrasts.parquet")
     assert list(contrasts.p_exact) == [one.p_exact for one in compare(tables)]
     assert len(pd.read_parquet(tmp_path / "trials.parquet")) == len(tables.trials)
@@ -77,11 +77,11 @@ def test_cells_are_means_of_participants_means(tables: Tables) -> None:
 def test_a_study_in_which_nothing_was_done_has_a_page(tmp_path: Path) -> None:
     made = made_up(people=1)
     empty = Tables(PROTOCOL, made.trials.iloc[:0], made.answers.iloc[:0])
-    text = write_report(empty, tmp_path, simulated=False).read_text(encoding="utf-8")
+    text = write_report(empty, tmp_path).read_text(encoding="utf-8")
     assert "no pair of trials; nothing can be said" in text
 
 
 def test_without_the_extra_one_line_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(packages, "find_spec", lambda name: None if name == "statsmodels" else find_spec(name))
     with pytest.raises(ConfigurationError, match=r"^study report: statsmodels is not installed; .*\[study\]'$"):
-        write_report(made_up(people=1), tmp_path, simulated=True)
+        write_report(made_up(people=1), tmp_path)

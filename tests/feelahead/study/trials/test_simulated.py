@@ -7,8 +7,8 @@ import pytest
 
 from feelahead.study.events import Begun
 from feelahead.study.folder import Study
+from feelahead.study.report.reading import read_tables
 from feelahead.study.trials.simulated import run_simulated
-from feelahead.study.trials.tables import read_tables
 
 PROTOCOL = """
 name = "Small"
@@ -31,7 +31,9 @@ margin_m = 0.03
 def run(folder: Path, protocol: Path, workers: int) -> tuple[pandas.DataFrame, pandas.DataFrame]:
     with Study(folder, protocol) as study:
         run_simulated(study, 2, workers)
-    return read_tables(folder)[1:]
+    tables = read_tables(folder)
+    assert tables.simulated
+    return tables.trials, tables.answers
 
 
 @pytest.mark.long

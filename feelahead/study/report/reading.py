@@ -1,0 +1,46 @@
+"""Tables of a study: a row for each trial and each answer, from journal and recordings anew."""
+
+from dataclasses import asdict, fields
+from pathlib import Path
+from typing import Final
+
+from common.errors import ConfigurationError
+from common.recording.packages import require_packages
+from feelahead.printing.progress import progress
+from feelahead.study.events import Enrolled
+from feelahead.study.folder import TRIALS, read_study
+from feelahead.study.records import AnswerRecord, answer_records, trial_records, withdrawn
+from feelahead.study.report.outcomes import Tables
+from feelahead.study.trials.outcome import Outcome, outcome_of
+
+NEVER_ARMED: Final = "the arm was never armed"
+
+
+def read_tables(folder: Path) -> Tables:
+    """Return the tables of the study in `folder`; ConfigurationError for a folder of none, or a damaged recording.
+
+    Trials are in the order of participants, plan and attempts.
+    """
+    require_packages("study", "pandas", extra="study")
+    import pandas as pd  # noqa: PLC0415  # large
+
+    protocol, events = read_study(folder)
+    records = sorted(trial_records(protocol, events), key=lambda one: (one.participant, not one.practice, one.trial))
+    if not records:
+        raise ConfigurationError(f"study report {folder}: no trial has begun; valid: a study with trials")
+    nothing = dict.fromkeys(field.name for field in fields(Outcome))
+    rows = []
+    with progress("reading recordings", float(len(records))) as shown:
+        for record in records:
+            complete = record.status == "complete"
+            found = outcome_of(folder / TRIALS / record.recording, protocol.limit_s) if complete else None
+            row = asdict(record) | (nothing if found is None else asdict(found))
+            if complete and found is None:
+                row["excluded"] = record.excluded or NEVER_ARMED
+            rows.append(row)
+            shown.advance(1.0)
+    answers = [asdict(one) for one in answer_records(protocol, events)]
+    columns = [field.name for field in fields(AnswerRecord)]
+    simulated = any(isinstance(event, Enrolled) and event.simulated for event in events)
+    frames = pd.DataFrame(rows), pd.DataFrame(answers, columns=columns)
+    return Tables(protocol, *frames, withdrawn(events), simulated=simulated)
