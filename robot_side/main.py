@@ -20,12 +20,13 @@ from robot_side.compiled.kernel import late_kernels
 from robot_side.compiled.warm_up import kernel_digests, kernels_compiled, warm_up
 from robot_side.core.robot_parts import RobotParts
 from robot_side.core.robot_side import RobotSide
+from robot_side.drivers.mujoco.simulation_witness import witness_of
 from robot_side.drivers.mujoco.viewpoints import first_person_eye, overview_eye
 from robot_side.drivers.remote.connected_drivers import ConnectedDrivers, driver_ports
 from robot_side.parts import SceneParts, build_parts, take_limits
 from robot_side.perceiving.starting import surfaced
-from robot_side.recorders import recorders
 from robot_side.recording.recorder import RobotEncoder
+from robot_side.recording.true_states import recorders
 from robot_side.settings import RobotSettings
 from robot_side.tick.events import Listener
 from robot_side.tick.outgoing import SENT_STREAMS
@@ -87,7 +88,11 @@ def command(arguments: Sequence[str], adapt: Callable[[RobotParts], Adapted] = a
         drivers.surfaces = surfaces = process.stack.enter_context(surfaced(settings, process.note, loop.clock.now()))
         parts = build_parts(settings, epoch, clock_domain(), announce=process.note, drivers=drivers, surfaces=surfaces)
         door.ready()
-        recorder = [] if recording is None else recorders(parts, recording.noted.append)
+        recorder = (
+            []
+            if recording is None
+            else recorders(witness_of(parts.scene, parts.arm), parts.truth, recording.noted.append)
+        )
         core_parts, others = adapt(parts)
         physics = PhysicsTime(loop.clock, settings.seed)
         core = RobotSide(core_parts, [physics, *recorder, *others, *([] if surfaces is None else [surfaces])])

@@ -32,10 +32,11 @@ from robot_side.compiled.warm_up import warm_up
 from robot_side.core.robot_side import RobotSide
 from robot_side.depth.camera_settings import BY_DEPTH
 from robot_side.drivers.mujoco.scene import Scene, load_scene
+from robot_side.drivers.mujoco.simulation_witness import witness_of
 from robot_side.drivers.mujoco.true_contact import TrueContact
 from robot_side.parts import build_parts
 from robot_side.perceiving.own_perception import perceived_by
-from robot_side.recorders import recorders
+from robot_side.recording.true_states import recorders
 from robot_side.settings import RobotSettings
 from robot_side.tick import events
 
@@ -115,7 +116,9 @@ class Episode:
         notes, listeners = self._recording, [*self._listeners]
         listeners += [] if self._sampler is None else [self._sampler]
         listeners += [self.parts.camera] if isinstance(self.parts.camera, events.Listener) else []
-        robot_side = RobotSide(self.parts, listeners if notes is None else [*listeners, *recorders(parts, notes.note)])
+        if notes is not None:
+            listeners += recorders(witness_of(self.scene, parts.arm), parts.truth, notes.note)
+        robot_side = RobotSide(self.parts, listeners)
         warm_up()  # after the scene was loaded, as it decides which kernels are imported
         hearing = [*self._operator_listeners, *([] if notes is None else [notes.operator])]
         operator = build_operator_side(self.operator_settings, 2, VIRTUAL_CLOCK, hearing)

@@ -41,7 +41,7 @@ def _paper_isotropic(inputs: LawInputs) -> NamedLaw:
 
 
 def _margin(inputs: LawInputs) -> NamedLaw:
-    from robot_side.laws.margin import MarginLaw  # noqa: PLC0415
+    from robot_side.laws.paper import MarginLaw  # noqa: PLC0415
 
     return MarginLaw(inputs)
 

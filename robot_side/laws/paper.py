@@ -146,3 +146,17 @@ class PaperLaw:
         found = overlaps_along(spheres, to_target_m, pose.tool_rotation[:, 2], table, classes)
         limited = (to_target_m < radii_m).any() and (classes == TARGET).any()
         return found.behind_m3 / full_m3, found.ahead_m3 / full_m3, bool(limited)
+
+
+class MarginLaw(PaperLaw):
+    """The paper's law with one enlargement, `law_margin_m`, whatever errors, speed and delay are, for comparison.
+
+    A warning by distance alone does this. With the mean enlargement of another law it compares to that one.
+    """
+
+    def _enlarged(self, situation: Situation, camera: tuple[float, float]) -> tuple[FloatArray, EnlargementTerms]:
+        """Return the margin for each sphere (m,), and its terms: a mean, and nothing that varies."""
+        del camera
+        margin_m = self._inputs.paper.margin_m
+        terms = EnlargementTerms(margin_m, margin_m, 0.0, 0.0, 0.0, 0.0, situation.loop_age_s, 0.0)
+        return np.full(len(situation.pose.sphere_radii_m), margin_m), terms

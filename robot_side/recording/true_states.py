@@ -5,7 +5,7 @@ No controller knows any of it, and no side uses it.
 
 import math
 from collections.abc import Callable, Mapping
-from typing import Protocol
+from typing import Any, Protocol
 
 from common.protocol.messages import Vector3
 from common.recording.entries import Kind
@@ -14,6 +14,7 @@ from common.roles import Role
 from robot_side.outcome.figures import TRUTH_PERIOD_S, Observer
 from robot_side.outcome.hits import Hits
 from robot_side.outcome.placing import Placing
+from robot_side.recording.recorder import RobotRecorder
 from robot_side.tick.events import Listener, Tick
 from robot_side.tick.truth import ContactOnset
 
@@ -88,3 +89,9 @@ class TrueStates(Listener):
                 ),
             )
         )
+
+
+def recorders(witness: Witness | None, observer: Observer | None, note: Callable[[Any], None]) -> list[Listener]:
+    """Return the listeners that give a recording what they note of a run; without a witness, no truth is recorded."""
+    truth = [] if witness is None or observer is None else [TrueStates(witness, observer, note)]
+    return [RobotRecorder(note), *truth]

@@ -153,7 +153,7 @@ ARROWS = """
         feelahead/study/trials
     feelahead/study: common common/command common/files robot_side/drivers/mujoco robot_side/laws/named.py
     feelahead/commands/bench_and_try.py: common common/files feelahead/lab
-    feelahead/study/trials: common common/recording robot_side/laws/paper_settings.py robot_side/settings.py
+    feelahead/study/trials: common/recording robot_side/laws/paper_settings.py robot_side/settings.py
         operator_side operator_side/people operator_side/settings.py feelahead/both_sides feelahead/lab
         feelahead/printing feelahead/study
     feelahead/commands/study: common common/command feelahead/printing feelahead/study
@@ -213,7 +213,7 @@ LIBRARIES = {
 """Rooms and files that may import each library, or use a clock"""
 
 
-PLAN = {"common": (29, 53, 7), "robot_side": (25, 99, 12), "operator_side": (20, 70, 9)}
+PLAN = {"common": (29, 53, 7), "robot_side": (25, 100, 12), "operator_side": (20, 70, 9)}
 """Most rooms, arrows and floors of a package. Here each file or folder directly in the package is a room.
 
 Arrow: some file of one room imports a file of the other. Floors: rooms in the longest chain of arrows.

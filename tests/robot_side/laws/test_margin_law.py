@@ -5,8 +5,8 @@ import dataclasses
 import numpy as np
 import pytest
 
-from robot_side.laws.margin import MarginLaw
 from robot_side.laws.named import make_law
+from robot_side.laws.paper import MarginLaw
 from robot_side.laws.paper_settings import PaperSettings
 from tests.helpers.field.fields import ball_pose
 from tests.helpers.field.situations import inputs, situation, walls
