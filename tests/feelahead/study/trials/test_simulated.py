@@ -58,6 +58,8 @@ def test_a_whole_study_gives_the_same_tables_whatever_interrupts_it(tmp_path: Pa
     again, same_answers = run(tmp_path / "killed", protocol, 1)
     faults = again[again["status"] == "fault"]
     assert faults[["participant", "trial", "attempt"]].values.tolist() == [[1, first.trial, 1]]
-    complete = again[again["status"] == "complete"].drop(columns=["attempt", "recording"]).reset_index(drop=True)
-    pandas.testing.assert_frame_equal(complete, trials.drop(columns=["attempt", "recording"]), check_dtype=False)
+    complete = again[again["status"] == "complete"].reset_index(drop=True)
+    assert complete["excluded"].isna().all()
+    others = ["attempt", "recording", "excluded"]
+    pandas.testing.assert_frame_equal(complete.drop(columns=others), trials.drop(columns=others), check_dtype=False)
     pandas.testing.assert_frame_equal(same_answers, answers)
