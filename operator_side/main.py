@@ -37,7 +37,8 @@ def command(arguments: Sequence[str], backend: HidBackend | None = None) -> int:
         # would inherit.
         console = None
         if settings.console:
-            console = Console(settings.connect, port=settings.console_port, token=settings.console_token)
+            port, token, back = settings.console_port, settings.console_token, settings.console_back
+            console = Console(settings.connect, port=port, token=token, back=back)
             process.stack.enter_context(console)
         topics, connections = view_topics(settings), settings.connections
         sockets = OperatorSockets(

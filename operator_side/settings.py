@@ -78,6 +78,9 @@ class OperatorSettings(SideOptions):
     console_token: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
     """File that contains the token of the console's address, for a program that restarts this side while the page stays
     open. Pages then offer to run again, and --status json has an event for it."""
+    console_back: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
+    """File that contains the address to which the console's page goes once the run is over. The page then shows what a
+    person needs to drive, and nothing that tells law, haptics or delay: for a study (docs/console.md)."""
     tui: bool = False
     """Show the console's facts on the whole terminal instead of one line, for machines without a browser."""
     person: Annotated[PersonSettings, tyro.conf.Suppress] = field(default_factory=PersonSettings)
@@ -100,6 +103,8 @@ class OperatorSettings(SideOptions):
         check_choice(self.device, self.controller)
         if self.console_token is not None:
             _check_token(self.console_token)
+        if self.console_back is not None and not self.console_back.is_file():
+            raise ValueError(f"--console-back {self.console_back}: there is no such file; valid: an existing file")
         if self.robot_key is not None and self.keys is None:
             raise ValueError(
                 "--robot-key is given without --keys; valid: both (`feelahead keys make operator` makes our key)"

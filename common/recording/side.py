@@ -195,6 +195,7 @@ class RecorderProcess:
         self.channel = self._companion.channel
         answer = _wait_for_answer(self.channel, _READY_LIMIT_S)
         said = {"error": "the recorder did not start"} if answer is None else json.loads(answer)
+        self._said = dict(_NOTHING)
         if said.get("error"):
             self._companion.close()
             raise ConfigurationError(
@@ -206,12 +207,19 @@ class RecorderProcess:
         """Process id of the recorder."""
         return self._companion.process_id
 
+    def error(self) -> str | None:
+        """Return why nothing more is recorded; None while all is well. Call it before `finish`."""
+        for message in self.channel.receive():
+            self._said |= json.loads(message)
+        if self.channel.ended and self._said["error"] is None:
+            self._said["error"] = KILLED
+        error: str | None = self._said["error"]
+        return error
+
     def finish(self) -> dict[str, Any]:
         """Finish the file, once all sides have ended; return figures of the file."""
-        said, ended = dict(_NOTHING), False
-        # Read its earlier messages first: a send to an ended process would lose them.
-        for message in self.channel.receive():
-            said |= json.loads(message)
+        self.error()  # reads its earlier messages first: a send to an ended process would lose them
+        said, ended = self._said, False
         self.channel.send(END)
         while not ended and (answer := _wait_for_answer(self.channel, _READY_LIMIT_S)) is not None:
             said |= json.loads(answer)

@@ -1,7 +1,7 @@
 """Status of each side, for JSON lines, recordings and pages.
 
 None means unknown. Every JSON line has every key, except `target` before the first search for a target. All distances
-are perceived ones, never the simulation's truth.
+are perceived ones, never the simulation's truth; only `placed` is true.
 """
 
 from typing import Any, Final
@@ -79,6 +79,8 @@ class RobotStatus(SideStatus, frozen=True, kw_only=True):
     """Distance, in any direction, from the gripper's surface to the nearest object"""
     target_mm: float | None = None
     """Distance, in any direction, from the gripper's surface to the target"""
+    placed: bool | None = None
+    """Whether the simulated target was lifted and stands by itself; None with a real arm"""
     tick_us: float | None = None
     """Median duration of the ticks since the previous status; None unless the side runs in its own process, like the
     next five"""

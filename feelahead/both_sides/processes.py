@@ -17,6 +17,13 @@ from common.errors import ConfigurationError, FeelaheadError
 _BAD_INPUT = 2
 
 
+def flag_of(name: str, value: object) -> str:
+    """Return the flag of a side that sets its setting `name` to `value`."""
+    flag = name.replace("_", "-")
+    switch = f"--{flag}" if value else f"--no-{flag}"
+    return switch if isinstance(value, bool) else f"--{flag}={value}"
+
+
 class SideFailedError(FeelaheadError):
     """A side ended with an error (the text is the side's), ended early, or reported nothing in time."""
 

@@ -222,6 +222,7 @@ class RobotSide:
             r2_pulled=None if command is None else command.r2,
             hindrance=self.motion.hindrance.text,
             offset_s=self.session.link.clock_offset.offset_at(now_s),
+            placed=self.figures.placed,
         )
         if self.newest is None or (objects := self.sight.frame) is None:
             return status

@@ -103,6 +103,11 @@ class RunFigures(Listener):
                 self._next_truth_s = now_s + TRUTH_PERIOD_S
                 self.truth(self._observer.observe(), self._observer.roles, now_s)
 
+    @property
+    def placed(self) -> bool | None:
+        """Whether the target was lifted and stands by itself; None without a simulation"""
+        return self._placing.placed if self._knows_truth else None
+
     def since_start_s(self, time_s: float) -> float:
         """Return the time since the first tick."""
         return time_s - (self._start_s or 0.0)

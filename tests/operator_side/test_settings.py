@@ -46,3 +46,8 @@ def test_a_token_that_could_be_guessed_or_is_no_part_of_an_address_is_refused(
         OperatorSettings(console_token=path)
     path.write_text(secrets.token_urlsafe(16) + "\n")
     assert OperatorSettings(console_token=path).console_token == path
+
+
+def test_the_address_to_go_back_to_is_in_a_file(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match=r"--console-back .*back: there is no such file; valid: an existing file"):
+        OperatorSettings(console_back=tmp_path / "back")

@@ -14,7 +14,7 @@ from common.command.status import Status
 from common.command.stop_signal import StopSignal
 from common.status.codes import LinkState
 from common.status.statuses import OperatorStatus, RobotStatus
-from feelahead.both_sides.processes import SideFailedError, SideProcess
+from feelahead.both_sides.processes import SideFailedError, SideProcess, flag_of
 from feelahead.commands.demo.page import KeptPage, Lifetime, kept_addresses
 from feelahead.commands.demo.settings import DemoSettings
 from feelahead.commands.open_browser import show_address
@@ -122,9 +122,7 @@ def _flags(settings: DemoSettings, given: Collection[str], *names: str) -> Itera
     """Yield flags for those of `names` that the user gave; for all others the sides' configuration files decide."""
     for name in names:
         if name in given:
-            flag, value = name.replace("_", "-"), getattr(settings, name)
-            switch = f"--{flag}" if value else f"--no-{flag}"
-            yield switch if isinstance(value, bool) else f"--{flag}={value}"
+            yield flag_of(name, getattr(settings, name))
 
 
 def _watch(

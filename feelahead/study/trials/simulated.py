@@ -22,13 +22,11 @@ from feelahead.study.schedule import Planned, schedule
 from feelahead.study.steps import Consent, Enrol, Pause, Practice, Questions, Rest, Trial
 from feelahead.study.trials.outcome import Outcome, outcome_of
 from feelahead.study.trials.participants import Participant
+from feelahead.study.trials.sides import side_values
 from operator_side.people.settings import PersonSettings
 from operator_side.settings import OperatorSettings
-from robot_side.laws.paper_settings import MARGIN_M
 from robot_side.settings import RobotSettings
 
-_JITTER_MS: Final = 10.0
-"""Standard deviation of all delays but 0"""
 _LOOK_S: Final = 0.25
 _ARMING_S: Final = 6.0
 """Longest time before a trial begins, beyond two round trips"""
@@ -49,16 +47,8 @@ class Task:
 def run_task(task: Task) -> tuple[float, Outcome | None]:
     """Run a trial into its recording; return how long it took, in virtual time, and what came out."""
     planned, condition = task.planned, task.condition
-    link = f"delay {planned.delay_ms:g}ms {_JITTER_MS:g}ms distribution normal" if planned.delay_ms else ""
-    robot = RobotSettings(
-        scene=planned.scene,  # type: ignore[arg-type]  # checked by the protocol
-        seed=planned.seed,
-        link=link,
-        law=condition.law,
-        law_margin_m=condition.margin_m or MARGIN_M,
-        assist=condition.assist,
-    )
-    operator = OperatorSettings(seed=planned.seed, link=link, haptics=condition.haptics, person=task.person)
+    values = side_values(planned, condition)
+    robot, operator = RobotSettings(**values.robot), OperatorSettings(**values.operator, person=task.person)
     task.recording.unlink(missing_ok=True)
     longest_s = task.limit_s + _ARMING_S + 4e-3 * planned.delay_ms
     with Episode(robot=robot, operator=operator, person=GRASPING, sampled=False) as episode:

@@ -43,10 +43,13 @@ class Console:
     A process that ends unexpectedly is started again, at the same address. Until then its pages count as closed.
     """
 
-    def __init__(self, title: str, *, port: int = 0, live: bool = True, token: Path | None = None) -> None:
+    def __init__(
+        self, title: str, *, port: int = 0, live: bool = True, token: Path | None = None, back: Path | None = None
+    ) -> None:
         """Start the console process on `port` of this machine; 0 for any free port. live: not a replayed recording.
 
         token: file with the token of the page's address; pages then offer to run again. None for a random token.
+        back: file with the address to which pages go at the end; until then they show nothing that tells a condition.
         """
         self.address: str | None = None
         """Address of the page, with the token; None until the page is ready, and once the process has ended."""
@@ -67,7 +70,9 @@ class Console:
         """Whether the console process has ended for good; a note gives the reason."""
         self._port = port
         self._token = secrets.token_urlsafe(24) if token is None else token.read_text().strip()
-        self._run = msgspec.msgpack.encode({"title": title, "live": live, "may_run_again": token is not None})
+        to = None if back is None else back.read_text().strip()
+        run = {"title": title, "live": live, "may_run_again": token is not None and to is None, "back": to}
+        self._run = msgspec.msgpack.encode(run)
         self._kept: deque[str] = deque(maxlen=_MOST_NOTES)
         self._ends_s: deque[float] = deque(maxlen=_MOST_ENDS + 1)
         """Times of the process's newest unexpected ends"""

@@ -47,6 +47,7 @@ def test_what_was_never_seen_is_none_and_only_counts_are_0() -> None:
     counted = {name for name, value in empty.items() if value == 0}
     assert counted == {"ticks", "task.lifted_mm"}
     assert {name for name, value in empty.items() if value is None} == empty.keys() - counted
+    assert RunFigures().placed is None
 
 
 def test_figures_are_in_the_units_of_their_names() -> None:

@@ -14,6 +14,7 @@ import { Trigger } from "./triggers.js";
 
 const SILENCE_MS = 400; // facts come 30 times a second
 const REFRESH_MS = 100;
+const BACK_MS = 2000; // without a console for longer, a page of a study goes back
 const SELDOM = 10; // refreshes from one drawing of a late page's charts to the next
 const MOST_NOTES = 50;
 const SHOWN = new Set([ShownKind.FACTS, ShownKind.SCENE, ...VIEWS.keys()]); // what can be played again
@@ -34,6 +35,7 @@ const charts = {
 let open = false; // whether the console is connected
 let refreshedMs = performance.now();
 let heardMs = performance.now();
+let openMs = performance.now(); // when the console was last connected
 let everHeard = false;
 let closedBecause = "";
 let facts = null;
@@ -44,9 +46,11 @@ const frame = document.querySelector("#scene iframe");
 const slow = drawsSlowly();
 let run = { title: "", live: true };
 let ended = ""; // why the connection is expected to end
+let began = false; // whether a page of a study has begun to drive by itself
 
 const wire = new Worker("wire.js");
-const send = (words) => wire.postMessage({ words, saidMs: performance.timeOrigin + performance.now() });
+const say = (words) => wire.postMessage({ words, saidMs: performance.timeOrigin + performance.now() });
+const send = (words) => (run.back && words.mark ? undefined : say(words)); // in a study nobody puts the scene back
 const answers = new Answers(send);
 const hands = new Hands(document, send, () => views[0].capturedS, () => answers.waits);
 const replay = new Replay((kind, data) => show(typeof data === "string" ? JSON.parse(data) : { kind }, data));
@@ -89,6 +93,8 @@ function receive(message) {
     document.title = `feelahead: ${run.title}`;
     document.body.classList.toggle("replay", !run.live);
     replayButton.hidden = !run.live;
+    document.body.classList.toggle("study", Boolean(run.back));
+    if (run.back) draw(false);
     replay.forget();
     goLive();
   } else if (message.kind === ShownKind.PLAYER) {
@@ -153,6 +159,10 @@ function showFacts(message) {
   charts.delay.said = asked.map(([side, words]) => `emulated to the ${side}: ${words}`).join("; ");
   addTo(charts.stiffness, [facts.l2.meets, facts.r2.meets]);
   hands.show(facts);
+  if (run.back && facts.page?.may_drive && !facts.page.driver && !began) {
+    began = true;
+    byId("drive").click();
+  }
   showCounts(facts);
   if (replay.open && !mayPlayAgain()) goLive();
   replayButton.disabled = !mayPlayAgain();
@@ -164,7 +174,7 @@ function showFelt(message) {
   const { facts: { l2, r2, advancing, page }, fingers } = message;
   triggers.l2.show(l2, fingers[0], advancing === "L2", page?.yields?.[0]);
   triggers.r2.show(r2, fingers[1], advancing === "R2", page?.yields?.[1]);
-  sound.play(message.facts, fingers);
+  if (!run.back) sound.play(message.facts, fingers); // a tone would tell the condition
 }
 
 // While the last seconds are played again, the charts show these, and a line through them.
@@ -251,6 +261,11 @@ function refresh() {
   const silentMs = nowMs - heardMs;
   const lost = !open || ((run.live || !everHeard) && silentMs > SILENCE_MS);
   byId("lost").hidden = !lost || Boolean(ended && replay.open);
+  if (open) openMs = nowMs;
+  if (run.back && (ended || nowMs - openMs > BACK_MS)) {
+    location.replace(run.back);
+    run.back = null; // once
+  }
   if (lost) {
     const [word, because] = byId("lost").children;
     word.textContent = ended || (open ? (everHeard ? "NOTHING HEARD" : "WAITING FOR THE OPERATOR SIDE") : "CONNECTION LOST");
