@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from itertools import pairwise, product
 from typing import Final
 
+from feelahead.study.progress import Progress
 from feelahead.study.protocol import Protocol
 from feelahead.study.schedule import schedule, williams
 
@@ -50,6 +51,24 @@ def most_minutes(protocol: Protocol) -> Mapping[str, float]:
         "questions": len(protocol.questions) * len(protocol.conditions) * ANSWER_S,
     }
     return {name: duration_s / 60.0 for name, duration_s in parts_s.items()}
+
+
+def left_minutes(protocol: Protocol, progress: Progress, participant: int) -> float:
+    """Return the greatest duration of what is left for a participant, in minutes, reckoned as in `most_minutes`."""
+    plan, done, rest, practice = (
+        schedule(protocol, participant),
+        len(progress.complete),
+        protocol.rest,
+        protocol.practice,
+    )
+    left_s = (len(plan) - done) * protocol.limit_s
+    if practice is not None and progress.practised(practice) is None:
+        tries = sum(one.begun.practice and one.status == "complete" for one in progress.attempts)
+        left_s += (practice.most - tries) * protocol.limit_s
+    if rest is not None:
+        rests = set(range(rest.trials, len(plan), rest.trials)) - progress.rested
+        left_s += rest.seconds * sum(after >= done for after in rests)
+    return (left_s + len(protocol.questions) * (len(protocol.conditions) - len(progress.answers)) * ANSWER_S) / 60.0
 
 
 def _orders(protocol: Protocol) -> list[list[str]]:
