@@ -145,22 +145,34 @@ class Room:
         """Return what each page shows; neither tells the condition."""
         run = self._run
         phase = None if run is None else "saving" if run.closed else "stopping" if run.stopping else run.seen.side
-        shared = {"study": self._study.protocol.name, "controller": self._study.protocol.controller, "phase": phase}
-        shared |= {"ready": self._ready, "limit_s": self._study.protocol.limit_s}
-        views: Mapping[str, Mapping[str, Any]] = {}
-        if self._session is not None:
-            views = self._session.view(now_s)
-        shown = {"step": "choose"} | views.get("participant", {})
+        protocol = self._study.protocol
+        shared: dict[str, Any] = {
+            "study": protocol.name,
+            "controller": protocol.controller,
+            "limit_s": protocol.limit_s,
+        }
+        shared |= {"limit_s": protocol.limit_s, "phase": phase, "ready": self._ready}
+        views: dict[str, Any] = {} if self._session is None else dict(self._session.view(now_s))
         # Nothing to drive, once the sides are being stopped.
         console = None if run is None or run.stopping else run.seen.console
         participants, proposed = self._listed
-        experimenter = {"step": "choose"} | views.get("experimenter", {}) | shared
-        experimenter |= {"participants": participants, "proposed": proposed, "at_once": self._at_once}
-        experimenter |= {"controller_state": None if run is None else run.seen.controller}
+        left = {}
         if self._session is not None:
             progress = self._study.journal.progress(self._number)
-            experimenter["minutes_left"] = left_minutes(self._study.protocol, progress, self._number)
-        return {"experimenter": experimenter, "participant": shown | shared | {"console": console}}
+            left = {"minutes_left": left_minutes(protocol, progress, self._number)}
+        return {
+            "experimenter": {
+                "step": "choose",
+                **views.get("experimenter", {}),
+                **shared,
+                **left,
+                "participants": participants,
+                "proposed": proposed,
+                "at_once": self._at_once,
+                "controller_state": None if run is None else run.seen.controller,
+            },
+            "participant": {"step": "choose", **views.get("participant", {}), **shared, "console": console},
+        }
 
     def _hear(self, name: str, said: Mapping[str, Any], now_s: float, at_s: float) -> Start | Stop | None:
         session = self._session

@@ -156,7 +156,8 @@ ARROWS = """
     feelahead/study/trials: common/recording robot_side/laws/paper_settings.py robot_side/settings.py
         operator_side operator_side/people operator_side/settings.py feelahead/both_sides feelahead/lab
         feelahead/printing feelahead/study
-    feelahead/commands/study: common common/command feelahead/printing feelahead/study
+    feelahead/commands/study: common common/command common/recording common/status operator_side/viewing/console
+        feelahead/both_sides feelahead/commands/demo feelahead/printing feelahead/study feelahead/study/trials
     feelahead/commands: common/* robot_side/commissioning robot_side/compiled robot_side/depth robot_side/drivers/mujoco
         robot_side/laws/named.py robot_side/laws/paper_settings.py robot_side/settings.py robot_side/viewing
         operator_side/* feelahead/both_sides feelahead/printing feelahead/recordings
@@ -172,7 +173,7 @@ A file or folder without a row belongs to the room around it.
 LIBRARIES = {
     "viser": ("operator_side/viewing/console",),
     "trimesh": ("operator_side/viewing/console",),
-    "websockets": ("operator_side/viewing/console",),
+    "websockets": ("operator_side/viewing/console", "feelahead/commands/study"),
     "zmq": ("common/sockets", "feelahead/lab/link/bare.py"),
     "hid": ("operator_side/dualsense/hid/device.py",),
     "hidraw": ("operator_side/dualsense/hid/device.py",),

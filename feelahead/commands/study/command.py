@@ -42,6 +42,8 @@ class StudySettings(Limited):
     """Folder of the study, new, empty, or begun with the same protocol."""
     simulated: Annotated[Annotated[int, Meta(ge=1, le=999)] | None, tyro.conf.arg(metavar="N")] = None
     """Let this many simulated persons take part, in virtual time, instead of people."""
+    participant: Annotated[Annotated[int, Meta(ge=1, le=999)] | None, tyro.conf.arg(metavar="N")] = None
+    """Number of the participant who is here. It can also be chosen on the experimenter's page."""
     workers: Annotated[int, tyro.conf.arg(metavar="N"), Meta(ge=1, le=256)] = 1
     """With --simulated: number of processes; the figures do not depend on it."""
 
@@ -85,7 +87,7 @@ def study(arguments: Sequence[str]) -> int:
             _plan(parse_settings(PlanSettings, "feelahead study plan", rest))
         case ["report", *rest]:
             folder = _given(parse_settings(ReportSettings, "feelahead study report", rest).folder, "DIR")
-            tables = _late("report.reading").read_tables(folder)
+            tables = _late("feelahead.study.report.reading").read_tables(folder)
             sys.stdout.write(f"{_late('report.writing').write_report(tables, folder)}\n")
         case _:
             _run(parse_settings(StudySettings, "feelahead study", arguments))
@@ -99,18 +101,20 @@ def _run(settings: StudySettings) -> None:
     folder = _given(settings.out, "--out DIR")
     with Study(folder, protocol) as opened:
         if settings.simulated is not None:
-            _late("trials.simulated").run_simulated(opened, settings.simulated, settings.workers)
+            _late("feelahead.study.trials.simulated").run_simulated(opened, settings.simulated, settings.workers)
         _print(iter([_progress(opened)]))
         if settings.simulated is None:
-            sys.stdout.write("No page for people is built yet; valid: --simulated N\n")
+            _late("feelahead.commands.study.people").run_people(opened, settings.participant)
 
 
 def _plan(settings: PlanSettings) -> None:
     protocol = load_protocol(_given(settings.protocol, "PROTOCOL.toml"))
     planned = None
     if settings.pool is not None:
-        planned = _late("report.power").plan(_late("report.reading").read_tables(settings.pool))
-    sys.stdout.write(_late("report.preregistration").preregistration(protocol, planned))
+        planned = _late("feelahead.study.report.power").plan(
+            _late("feelahead.study.report.reading").read_tables(settings.pool)
+        )
+    sys.stdout.write(_late("feelahead.study.report.preregistration").preregistration(protocol, planned))
 
 
 def _checked(protocol: Protocol) -> Iterator[RenderableType]:
@@ -169,9 +173,9 @@ def _given(value: _Given | None, name: str) -> _Given:
 
 
 def _late(module: str) -> Any:
-    """Return a module of feelahead.study that needs more packages than this command."""
+    """Return a module that needs more packages than this command."""
     try:
-        return import_module(f"feelahead.study.{module}")
+        return import_module(module)
     except ModuleNotFoundError as error:
         raise ConfigurationError(
             f"study: {error.name} is not installed; in the clone: pip install '.[robot,operator,record,study]'"
