@@ -93,10 +93,21 @@ class Page:
         """Wait until a piece of JavaScript is true; AssertionError after `limit_s`. what: its name in this error."""
         # Evaluated from here: the page's policy forbids Playwright's own waiting within the page.
         try:
-            wait_until(what, lambda: bool(self.ask(script)), limit_s)
+            wait_until(what, lambda: self._holds(script), limit_s)
         except AssertionError:
             self.picture("unexpected")
             raise
+
+    def _holds(self, script: str) -> bool:
+        """Return whether a piece of JavaScript is true; a page that is just left for another one has nothing true."""
+        from playwright.sync_api import Error  # noqa: PLC0415  # not part of our environment
+
+        try:
+            return bool(self.ask(script))
+        except Error as error:
+            if "context was destroyed" not in str(error):
+                raise
+            return False
 
     def wait_for_text(self, selector: str, words: str, limit_s: float = LIMIT_S) -> None:
         script = f"document.querySelector({selector!r})?.textContent.toLowerCase().includes({words.lower()!r})"
