@@ -160,6 +160,7 @@ class Room:
         if self._session is not None:
             progress = self._study.journal.progress(self._number)
             left = {"minutes_left": left_minutes(protocol, progress, self._number)}
+            shared |= {"of": len(schedule(protocol, self._number))} if views["participant"]["step"] == "trial" else {}
         return {
             "experimenter": {
                 "step": "choose",

@@ -1,6 +1,7 @@
-"""A study with two participants in a real browser: a reload, a killed side, a killed study, a withdrawal."""
+"""A study with two participants in a real browser: a reload, a full disk, killed processes, a withdrawal."""
 
 import os
+import resource
 import signal
 import subprocess
 import sys
@@ -68,6 +69,14 @@ class Running:
             if int(parent) == self.process.pid and module.encode() in words:
                 return int(path.name)
         raise AssertionError(f"no {module} runs")
+
+    @contextmanager
+    def full_disk(self) -> Iterator[None]:
+        """Let no file of the study's process grow."""
+        before = resource.prlimit(self.process.pid, resource.RLIMIT_FSIZE)
+        resource.prlimit(self.process.pid, resource.RLIMIT_FSIZE, (1, before[1]))
+        yield
+        resource.prlimit(self.process.pid, resource.RLIMIT_FSIZE, before)
 
     def end(self, by: signal.Signals) -> int:
         self.process.send_signal(by)
@@ -198,7 +207,10 @@ def _first_participant(session: Session, run: Running) -> None:
         shown = str(participant.ask(WORDS)).lower()
     assert [word for word in TELLING if word in shown] == []
     experimenter.picture("study-experimenter")
-    session.end()
+    with run.full_disk():
+        session.end()
+        experimenter.wait_for_text("#trouble", "not written yet", TRIAL_S)
+        participant.wait_for_text("#card", "one moment")
     session.answer()
     session.rest()
     session.begin()

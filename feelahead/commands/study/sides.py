@@ -51,7 +51,7 @@ class TrialSides:
     def __init__(self, asked: Asked, desk: Desk, console_port: int) -> None:
         """Start recorder and sides; FeelaheadError if the recorder cannot be started."""
         self._log, self._seen = desk.log, Seen()
-        values, socket = side_values(asked.planned, asked.condition), desk.folder / asked.recording.name
+        values, socket = side_values(asked.planned, asked.condition), desk.folder / f"{asked.recording.stem}.socket"
         self._recorder = RecorderProcess(asked.recording, socket)
         self._said, self._start = Said(), Start(values.robot["link"], time.monotonic())
         with ExitStack() as stack:

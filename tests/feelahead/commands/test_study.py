@@ -16,6 +16,14 @@ def wide(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("COLUMNS", "120")
 
 
+@pytest.fixture(autouse=True)
+def here(monkeypatch: pytest.MonkeyPatch) -> list[int | None]:
+    """Numbers for which pages were served; none is served."""
+    numbers: list[int | None] = []
+    monkeypatch.setattr("feelahead.commands.study.people.run_people", lambda _, number: numbers.append(number))
+    return numbers
+
+
 def test_the_check_of_the_example_shows_its_balance_and_its_minutes(capsys: pytest.CaptureFixture[str]) -> None:
     assert study(["check", str(EXAMPLE)]) == 0
     said = capsys.readouterr().out
@@ -39,7 +47,7 @@ def test_the_check_says_which_numbers_would_be_balanced(
 
 
 def test_a_study_that_was_begun_shows_where_it_is_and_no_condition(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], here: list[int | None]
 ) -> None:
     folder = tmp_path / "study"
     assert study([str(EXAMPLE), "--out", str(folder)]) == 0
@@ -48,7 +56,8 @@ def test_a_study_that_was_begun_shows_where_it_is_and_no_condition(
         do_step(opened, 7)
         assert do_step(opened, 7) is not None
     capsys.readouterr()
-    assert study([str(EXAMPLE), "--out", str(folder)]) == 0
+    assert study([str(EXAMPLE), "--out", str(folder), "--participant", "7"]) == 0
+    assert here == [None, 7]
     rows = [line for line in capsys.readouterr().out.splitlines() if line.startswith("|")]
     words = [[word.strip() for word in row.split("|")[1:-1]] for row in rows]
     assert words[-2:] == [["2", "60", "0", "done"], ["7", "0", "0", "practice"]]

@@ -41,6 +41,7 @@ function show() {
   byId("next").hidden = !next;
   if (next) byId("next").textContent = next[1];
   byId("next").disabled = phase !== null;
+  byId("end").hidden = byId("at_once").parentElement.hidden = gone;
   byId("end").disabled = !["starting", "up", "not heard"].includes(phase);
   byId("pause").hidden = gone || step === "enrol" || step === "pause";
   byId("pause").textContent = state.paused ? "Pause comes after this trial" : "Pause";
