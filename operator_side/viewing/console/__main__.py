@@ -22,6 +22,7 @@ import threading
 from collections.abc import Iterator
 from itertools import islice
 from typing import Any, Final
+from urllib.parse import urlsplit
 
 import msgspec
 
@@ -70,6 +71,7 @@ class _Process:
         self._drawing: Any = None
         self._cues: Any = None
         self._pages: Any = None
+        self._gate: Any = None
         self._drawn_s = -math.inf
         self._steps: Any = None
         self._lacks: tuple[int, int] | None = None
@@ -105,7 +107,7 @@ class _Process:
             self._give_up(f"--console-port {port}: {error.strerror}; valid: a free port, or 0 to choose one")
             return
         port = part.getsockname()[1]
-        gate = Gate(token, port)
+        self._gate = gate = Gate(token, port)
         self._pages = Pages(lambda count: self._say("w", b"%d" % count), self._say)
         try:
             server = Server(gate, self._pages, part)
@@ -180,6 +182,8 @@ class _Process:
             self._pages.show(ShownKind.ENDED, f'{{"kind":"{ShownKind.ENDED}"}}', lasting=True)
         elif kind in _LASTING:
             lasting = {"kind": _LASTING[kind], **msgspec.msgpack.decode(content)}
+            if back := lasting.get("back"):
+                self._gate.back = "{0.scheme}://{0.netloc}".format(urlsplit(back))
             self._pages.show(_LASTING[kind], msgspec.json.encode(lasting).decode(), lasting=True)
         elif kind == b"v":
             with self._skipping():

@@ -29,6 +29,8 @@ class Gate:
     def __init__(self, token: str, port: int) -> None:
         self.address = f"http://127.0.0.1:{port}/{token}/"
         """Address of the page, with the token: whoever knows it is admitted."""
+        self.back = ""
+        """Origin of the server to which our page goes at the end: the page may ask whether it answers"""
         self._token = token.encode("ascii")
         self._hosts = (f"127.0.0.1:{port}", f"localhost:{port}")
 
@@ -66,7 +68,7 @@ class Gate:
             f" connect-src 'self' data: blob: {sockets}"
             if scene
             else f"default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:;"
-            f" frame-src {sites}; connect-src 'self' {sockets}"
+            f" frame-src {sites}; connect-src 'self' {sockets} {self.back}".rstrip()
         )
         ancestors, framing = (sites, {}) if scene else ("'none'", {"X-Frame-Options": "DENY"})
         return framing | {

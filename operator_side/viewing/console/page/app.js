@@ -263,7 +263,7 @@ function refresh() {
   byId("lost").hidden = !lost || Boolean(ended && replay.open);
   if (open) openMs = nowMs;
   if (run.back && (ended || nowMs - openMs > BACK_MS)) {
-    location.replace(run.back);
+    goBack(run.back);
     run.back = null; // once
   }
   if (lost) {
@@ -276,6 +276,16 @@ function refresh() {
   const limits = facts?.pictures;
   if (replay.open) views.forEach((view) => view.showReplay((replay.untilMs - replay.atMs) / 1000));
   else views.forEach((view, k) => view.showAge(limits?.states[k] ?? null, limits?.old_s[k] ?? null, limits?.dead_s[k]));
+}
+
+// Leave for the page of the study once it answers, whatever it answers: it may have to be started again first.
+async function goBack(to) {
+  try {
+    await fetch(new URL("/", to), { mode: "no-cors" });
+    location.replace(to);
+  } catch {
+    setTimeout(() => goBack(to), 500);
+  }
 }
 
 // A late page draws its charts seldom.
