@@ -44,6 +44,8 @@ TRIAL_S = 120.0
 WORDS = "document.body.innerText"
 EXPECTED = ("WebSocket", "ERR_", "status of 404")
 """Complaints while the study or a trial's console is away, and when a page asks whether the study is back"""
+DRAWN = """[...document.querySelectorAll('.drop, .gauge, .height, .trigger, .near, .age, #charts, #scene, #tools')]
+    .filter((one) => one.getClientRects().length).map((one) => one.id || one.className)"""
 TELLING = ("stiff", "haptic", "swept", "law", "enlarge", " mm", "ms old", "delay", "trigger", "felt", "seed")
 
 
@@ -207,8 +209,7 @@ def _first_participant(session: Session, run: Running) -> None:
     with participant.held("Space", "KeyW"):
         experimenter.wait_for_text("#phase", "runs for", TRIAL_S)
         participant.picture("study-trial")
-        shown = str(participant.ask(WORDS)).lower()
-    assert [word for word in TELLING if word in shown] == []
+        _check_blind(participant)
     experimenter.picture("study-experimenter")
     with run.full_disk():
         session.end()
@@ -221,11 +222,20 @@ def _first_participant(session: Session, run: Running) -> None:
     session.step("trial 2 of 2, attempt 2")
     assert "the robot side was lost" in experimenter.text("#faults")
     session.begin()
+    _check_blind(participant)
     drive(participant)
     participant.wait("document.querySelector('form') !== null", "the end of the trial", TRIAL_S + 90.0)
     session.answer()
     session.step("all done")
     experimenter.picture("study-done")
+
+
+def _check_blind(page: Page) -> None:
+    """Check that nothing on a trial's page tells its condition, a distance or a delay."""
+    shown = str(page.ask(WORDS)).lower()
+    assert "target" in shown
+    assert [word for word in TELLING if word in shown] == []
+    assert page.ask(DRAWN) == []
 
 
 def _second_participant(session: Session) -> None:

@@ -87,3 +87,12 @@ def test_only_the_scene_may_run_what_is_in_its_page_and_be_framed_by_ours() -> N
         policy = headers["Content-Security-Policy"].split()
         assert not [word for word in policy if word in ("*", "ws:", "http:", "https:")]
         assert (headers["Referrer-Policy"], headers["Cache-Control"]) == ("no-referrer", "no-store")
+
+
+def test_our_page_reaches_no_other_server_but_the_one_to_which_it_goes_back() -> None:
+    gate = Gate(TOKEN, PORT)
+    before = gate.headers("/")["Content-Security-Policy"]
+    gate.back = "http://127.0.0.1:4712"
+    after = gate.headers("/")["Content-Security-Policy"]
+    assert after.replace(f" {gate.back};", ";") == before != after
+    assert gate.headers("/scene/") == GATE.headers("/scene/")
