@@ -88,7 +88,7 @@ def study(arguments: Sequence[str]) -> int:
         case ["report", *rest]:
             folder = _given(parse_settings(ReportSettings, "feelahead study report", rest).folder, "DIR")
             tables = _late("feelahead.study.report.reading").read_tables(folder)
-            sys.stdout.write(f"{_late('report.writing').write_report(tables, folder)}\n")
+            sys.stdout.write(f"{_late('feelahead.study.report.writing').write_report(tables, folder)}\n")
         case _:
             _run(parse_settings(StudySettings, "feelahead study", arguments))
     return 0
