@@ -157,7 +157,8 @@ ARROWS = """
         operator_side operator_side/people operator_side/settings.py feelahead/both_sides feelahead/lab
         feelahead/printing feelahead/study
     feelahead/commands/study: common common/command common/recording common/status operator_side/viewing/console
-        feelahead/both_sides feelahead/commands/demo feelahead/printing feelahead/study feelahead/study/report feelahead/study/trials
+        feelahead/both_sides feelahead/commands/demo feelahead/printing feelahead/study feelahead/study/report
+        feelahead/study/trials
     feelahead/commands: common/* robot_side/commissioning robot_side/compiled robot_side/depth robot_side/drivers/mujoco
         robot_side/laws/named.py robot_side/laws/paper_settings.py robot_side/settings.py robot_side/viewing
         operator_side/* feelahead/both_sides feelahead/printing feelahead/recordings
