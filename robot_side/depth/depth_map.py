@@ -1,5 +1,6 @@
 """The map: pictures of depth cameras in, boxes behind the surfaces out."""
 
+import math
 from dataclasses import dataclass
 from typing import Final
 
@@ -11,7 +12,7 @@ from robot_side.depth.boxes import Boxes
 from robot_side.depth.free_space import SeenSpace
 from robot_side.depth.grid import Grid
 from robot_side.depth.motion.carrying import Carried
-from robot_side.depth.motion.seer import MotionSeer
+from robot_side.depth.motion.seer import UNSEEN_S, MotionSeer
 from robot_side.depth.motion.snapshots import snapshot
 from robot_side.depth.octree.planes import Planes
 from robot_side.depth.own_body import HELD_M, own_pixels, within
@@ -61,6 +62,7 @@ class DepthMap:
         self.motion = MotionSeer()
         self._carried = Carried(self.surfels)
         self._holds = False
+        self._taken_s: dict[int, float] = {}
 
     def integrate(
         self, picture: DepthPicture, pose: CameraPose, body: OwnBody, errors: DepthErrors, camera: int = 0
@@ -74,6 +76,8 @@ class DepthMap:
         depth_m = supported(measured, view)
         own = own_pixels(depth_m, view, body, self.settings.padding_m)
         facing = normals(depth_m, view)
+        self._taken_s[camera] = picture.taken_s
+        self.motion.end_unseen(picture.taken_s)
         self._carried.move(picture.taken_s, self.motion.movers)
         merged = self.surfels.integrate(picture, depth_m, facing, own, view, camera)
         self._find_motion(picture, pose, errors, depth_m, facing, own, camera)
@@ -124,6 +128,12 @@ class DepthMap:
     def boxes(self) -> Boxes:
         """Return the boxes behind all surfaces that have been in two pictures."""
         return self.planes.boxes()
+
+    @property
+    def moved_s(self) -> float:
+        """Time at which what moves is where the map has it: that of the camera furthest behind, but for silent ones"""
+        newest_s = max(self._taken_s.values(), default=math.nan)
+        return min((one for one in self._taken_s.values() if newest_s - one <= UNSEEN_S), default=math.nan)
 
     def velocities_m_s(self, boxes: Boxes) -> FloatArray:
         """Return the velocity (n, 3) of each of the map's boxes, in the world; 0 for what is not seen to move."""

@@ -37,12 +37,20 @@ class SurfaceFrames:
 
     def at(self, now_s: float) -> PerceivedObjects:
         """Return the frame at `now_s`: the same object until something in it has changed."""
-        known, shown = since(self._taken_s, now_s, self._unseen_m_s), self._shown
+        known, shown = self._since(now_s), self._shown
         moves = self._slots.moves
         if shown is None or known.unseen_m != shown.unseen_m or (moves and known.is_later(shown)):
             self._shown = known
             self._frame = self._slots.frame(self._taken_s[0], self._sds_m(), known, self._unknown)
         return self._frame
+
+    def _since(self, now_s: float) -> Since:
+        known, moved_s = since(self._taken_s, now_s, self._unseen_m_s), self._slots.moved_s
+        if not math.isfinite(moved_s):
+            return known
+        # One camera may be behind, and what moves was seen by another since.
+        moved_s += 0.5 * (self._taken_s[1] - self._taken_s[0])
+        return known._replace(carried_s=since((moved_s, moved_s), now_s, 0.0).carried_s)
 
     def _sds_m(self) -> FloatArray:
         """Return σ_c of each slot (k,): of calibration and mount, and of the pixels that made the surface (eq. 1-2)."""

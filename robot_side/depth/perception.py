@@ -38,7 +38,8 @@ class DepthPerception:
         holds: whether the gripper holds something.
         """
         boxes = self._map.boxes()
-        return self._slots.update(boxes, near_m, self._errors, self._map.velocities_m_s(boxes), holds=holds)
+        moves = self._map.velocities_m_s(boxes), self._map.moved_s
+        return self._slots.update(boxes, near_m, self._errors, *moves, holds=holds)
 
     def whole(self) -> SlotChanges:
         """Return all surfaces as changes, for a process that has missed some."""

@@ -5,6 +5,7 @@ Unused slots are parked far away, with volume: a box
 without volume would make a scene's table be built anew. The process of the map calls `update`, that of the law `apply`.
 """
 
+import math
 from dataclasses import dataclass
 from typing import Final
 
@@ -56,6 +57,8 @@ class SlotChanges:
     """(c,) number of the plane of which the box is a piece: that of its first object; -1 for a box that stands alone"""
     crowded_out: int
     """Boxes for which there was no slot: those furthest from the gripper"""
+    moved_s: float = math.nan
+    """Time at which what moves is there: that of the newest picture of any camera; NaN: that of the frame"""
 
 
 class Slots:
@@ -67,6 +70,8 @@ class Slots:
         self._numbers, self._roles, self.sds_m = _unused(rows)
         """(n,) standard deviation of each slot's place by its pixels' errors; 0 for unused slots"""
         self._velocities_m_s: FloatArray = np.zeros((rows, 3))
+        self.moved_s = math.nan
+        """As of the newest changes"""
         self._ids: IntArray = np.full(rows, -1)
         self._planes: IntArray = np.full(rows, -1)
         self._barred: BoolArray = np.zeros(rows, dtype=np.bool_)
@@ -118,12 +123,14 @@ class Slots:
         near_m: FloatArray,
         errors: DepthErrors = EXACT,
         velocities_m_s: FloatArray | None = None,
+        moved_s: float = math.nan,
         *,
         holds: bool = False,
     ) -> SlotChanges:
         """Give each box a slot, which it keeps as long as it is there, and return what changed.
 
-        errors: of the cameras. velocities_m_s (n, 3): of the boxes; None: all are at rest.
+        errors: of the cameras. velocities_m_s (n, 3): of the boxes; None: all are at rest. moved_s: as in
+        `SlotChanges`.
 
         holds: whether the gripper holds something. Slots that become free meanwhile stay free: one may be that of the
         held object, and nobody would feel another box in it.
@@ -169,7 +176,7 @@ class Slots:
         same = (numbers == self._numbers).all(axis=1) & (roles == self._roles) & (sds_m == self.sds_m)
         changed = np.flatnonzero(~same | (planes != self._planes) | (moving_m_s != self._velocities_m_s).any(axis=1))
         self._numbers, self._roles, self.sds_m, self._planes = numbers, roles, sds_m, planes
-        self._velocities_m_s = moving_m_s
+        self._velocities_m_s, self.moved_s = moving_m_s, moved_s
         return self._changes(changed, len(left))
 
     def whole(self) -> SlotChanges:
@@ -185,6 +192,7 @@ class Slots:
             self._velocities_m_s[slots],
             self._planes[slots],
             crowded_out,
+            self.moved_s,
         )
 
     def apply(self, changes: SlotChanges) -> None:
@@ -207,7 +215,7 @@ class Slots:
             valid = f"valid: -1 to {self._objects[-1]}"
             raise ValueError(f"planes = {changes.planes.min()} to {changes.planes.max()}; {valid}")
         self._numbers[slots], self.sds_m[slots], self._planes[slots] = changes.numbers, changes.sds_m, changes.planes
-        self._velocities_m_s[slots] = changes.velocities_m_s
+        self._velocities_m_s[slots], self.moved_s = changes.velocities_m_s, changes.moved_s
         if (self._roles[slots] != changes.roles).any():
             self._roles[slots] = changes.roles
             of_target = Role.TARGET if (self._roles[:PIECES] == _TARGET).any() else Role.OBSTACLE

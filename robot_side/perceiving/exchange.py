@@ -89,6 +89,7 @@ class Surfaces(msgspec.Struct, frozen=True, tag=True):
     velocities_m_s: bytes
     planes: bytes
     crowded_out: int
+    moved_s: float
     seen: dict[str, float]
     """Figures of the pictures since the last message, and of the map"""
     unknown: tuple[float, float, float, float, float]
@@ -109,6 +110,7 @@ def surfaces(
         velocities_m_s=changes.velocities_m_s.tobytes(),
         planes=changes.planes.tobytes(),
         crowded_out=changes.crowded_out,
+        moved_s=changes.moved_s,
         seen=seen,
         unknown=unknown.shares,
         unknown_boxes=unknown.boxes_m.tobytes(),
@@ -125,6 +127,7 @@ def changes_of(message: Surfaces) -> SlotChanges:
         np.frombuffer(message.velocities_m_s).reshape(-1, 3),
         np.frombuffer(message.planes, dtype=np.int64),
         message.crowded_out,
+        message.moved_s,
     )
 
 

@@ -11,7 +11,7 @@ from robot_side.compiled.vectors import add, scale
 from robot_side.depth.boxes import Boxes
 from robot_side.depth.grid import block_of
 from robot_side.depth.motion.regions import LABELS, LabelsArray
-from robot_side.depth.motion.seer import Mover
+from robot_side.depth.motion.seer import UNSEEN_S, Mover
 from robot_side.depth.motion.snapshots import Snapshot
 from robot_side.depth.surfel_map.merging import DIRTY
 from robot_side.depth.surfel_map.surfel_columns import Count, surfels_at
@@ -48,9 +48,9 @@ class Carried:
 
     def move(self, now_s: float, movers: dict[int, Mover]) -> None:
         """Let the surfels be where they are at `now_s`."""
-        elapsed_s, self._time_s = now_s - self._time_s, max(now_s, self._time_s)
+        elapsed_s, self._time_s = min(now_s - self._time_s, UNSEEN_S), max(now_s, self._time_s)
         rows = self._rows(np.array(list(movers), dtype=np.int64))
-        if not rows.size or not 0.0 < elapsed_s < np.inf:
+        if not rows.size or elapsed_s <= 0.0:
             return
         surfels, table, grid = self._surfels, self._surfels.table, self._surfels.grid
         surfels.look_again(rows[table.shown[rows] > 0])

@@ -21,7 +21,7 @@ _STEP_M: Final = 0.02
 """Displacement at which what is known to move is compared with its earlier picture"""
 _CONFIRMED: Final = 2
 """Pictures after which motion counts"""
-_UNSEEN_S: Final = 0.25
+UNSEEN_S: Final = 0.25
 """Time without a picture that shows motion after which it has ended"""
 _NEWER: Final = 0.5
 """Share of the newest picture in a velocity"""
@@ -80,6 +80,11 @@ class MotionSeer:
         """Return the identities (n,) of what moves in a camera's pictures."""
         return np.array([one for one in self.movers if one % _OF_CAMERA == camera], dtype=np.int64)
 
+    def end_unseen(self, now_s: float) -> None:
+        """Forget what no picture has shown to move for too long, also of a camera that sends no more."""
+        for identity in [one for one, mover in self.movers.items() if now_s - mover.seen_s > UNSEEN_S]:
+            del self.movers[identity]
+
     def noise(self, camera: int) -> float:
         """Return the factor on the variance of a camera's errors by which standing things differ in its pictures."""
         return self._earlier[camera].noise
@@ -95,11 +100,13 @@ class MotionSeer:
         mine = set(self.of_camera(camera).tolist())
         members: LabelsArray = np.zeros(newest.depth_m.shape, dtype=np.int32)
         found: set[int] = set()
-        for before in _to_compare(earlier, newest, [movers[one] for one in mine]):
+        for before, oldest in _to_compare(earlier, newest, [movers[one] for one in mine]):
             since_s, slack = now_s - before.taken_s, _seeming(newest, before)
             regions = moved_regions(newest, before, slack, pixels_alike)
             earlier.measure(regions.noise)
             for region in range(1, regions.number + 1):
+                if members[regions.labels == region].any():
+                    continue  # a faster thing, as a newer picture has shown
                 expected = [np.zeros(3), *(since_s * movers[one].velocity_m_s for one in mine)]
                 tries = (fit_motion(newest, before, regions, region, slack, pixels_alike, one) for one in expected)
                 fit = next((one for one in tries if one is not None), None)
@@ -115,15 +122,15 @@ class MotionSeer:
                     if sooner is not None and float(np.linalg.norm(sooner.moved_m)) > faster * lately_s:
                         velocity_m_s = sooner.moved_m / lately_s
                 identity = self._update(fit, velocity_m_s, now_s, mine, found, camera)
-                if movers[identity].counts:
-                    note_members(newest, before, regions, region, slack, fit.moved_m, identity, members)
-            # What moves is elsewhere than in any earlier picture.
-            if found or regions.number == 0:
+                note_members(newest, before, regions, region, slack, fit.moved_m, identity, members)
+            # What moves is elsewhere than in the oldest picture.
+            if oldest and regions.number == 0:
                 break
         for identity in mine - found:
-            if now_s - movers[identity].seen_s > _UNSEEN_S or not movers[identity].counts:
+            if not movers[identity].counts:
                 del movers[identity]
         earlier.add(newest)
+        members[~np.isin(members, [one for one, mover in movers.items() if mover.counts])] = 0
         return members if members.any() else None
 
     def _update(
@@ -148,8 +155,8 @@ class MotionSeer:
         return identity
 
 
-def _to_compare(earlier: Earlier, newest: Snapshot, movers: list[Mover]) -> Iterator[Snapshot]:
-    """Yield the earlier pictures to compare with, one after the other, until something is found in one."""
+def _to_compare(earlier: Earlier, newest: Snapshot, movers: list[Mover]) -> Iterator[tuple[Snapshot, bool]]:
+    """Yield the earlier pictures to compare with, and whether each is the oldest: that for the fastest thing first."""
     speed_m_s = max((float(np.linalg.norm(one.velocity_m_s)) for one in movers), default=0.0)
     ages_s = (*((min(_STEP_M / speed_m_s, _AGES_S[0]),) if speed_m_s > 0.0 else ()), *_AGES_S)
     given: list[Snapshot] = []
@@ -157,7 +164,7 @@ def _to_compare(earlier: Earlier, newest: Snapshot, movers: list[Mover]) -> Iter
         before = earlier.of_age(newest.taken_s, age_s, newest)
         if before is not None and not any(before is one for one in given):
             given.append(before)
-            yield before
+            yield before, age_s == _AGES_S[0]
 
 
 def _seeming(newest: Snapshot, before: Snapshot) -> tuple[float, float]:

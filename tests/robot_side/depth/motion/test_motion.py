@@ -119,3 +119,33 @@ def test_a_long_thing_that_slides_along_itself_moves_as_its_end_does() -> None:
     assert len(moving) > 3
     assert -0.19 < moving[:, 0].mean() < -0.09
     assert np.abs(moving[:, 1:].mean(axis=0)).max() < 0.02
+
+
+def test_a_fast_thing_hides_no_slow_one() -> None:
+    scene, speeds_m_s = Scene((-0.06, 0.0, 0.0)), []
+    for _ in range(20):
+        x, y, z = scene.ball_m().tolist()
+        swings_m = (0.4 * PERIOD_S * scene.number) % 0.5
+        fast = Ball((0.75, -0.45 + min(swings_m, 0.5 - swings_m), 0.15), 0.05)
+        boxes = scene.look(1, [TABLE, Ball((x, y, z), RADIUS_M), fast])
+        found = scene.map.velocities_m_s(boxes)
+        on_slow = found.any(axis=1) & (np.linalg.norm(boxes.centers_m - scene.ball_m(), axis=1) < RADIUS_M + 0.02)
+        speeds_m_s.append(float(np.linalg.norm(found[on_slow].mean(axis=0))) if on_slow.any() else 0.0)
+    assert min(speeds_m_s[-8:]) > 0.045
+
+
+def test_a_motion_ends_though_its_camera_sends_no_more() -> None:
+    scene = Scene((-0.1, 0.0, 0.0))
+    before = scene.look(15)
+    moving = scene.map.velocities_m_s(before).any(axis=1)
+    away = Camera(looking((0.1, 0.35, 0.7), (-0.5, 0.9, 0.6)), errors=ERRORS)
+    for number in range(15):
+        picture = away.picture([TABLE], (scene.number + number) * PERIOD_S, scene.random)
+        scene.map.integrate(picture, away.pose, NOBODY, ERRORS, 1)
+    after = scene.map.boxes()
+    assert moving.any()
+    assert not scene.map.velocities_m_s(after).any()
+    # What nobody sees any more stays where it was seen, and a quarter of a second on.
+    high = after.centers_m[:, 2] > 0.1
+    assert after.centers_m[high, 0].min() > before.centers_m[moving, 0].min() - 0.1 * 0.3 - 0.02
+    assert scene.map.moved_s == pytest.approx((scene.number + 14) * PERIOD_S)
