@@ -27,6 +27,10 @@ class Witness(Protocol):
         """Roles of the objects, by name"""
         ...
 
+    def own_name(self, held: str) -> str | None:
+        """Return the simulation's name of a held object that is perceived by this name; None if it is not known."""
+        ...
+
     def touches(self, held: str | None) -> ContactOnset | None:
         """Return the fastest contact that began since the last call. held: object that the gripper holds."""
         ...
@@ -61,7 +65,7 @@ class TrueStates(Listener):
         if found is None:
             return
         situation = found.situation
-        held = None if situation.held is None else situation.objects.names[situation.held]
+        held = None if situation.held is None else self._witness.own_name(situation.objects.names[situation.held])
         roles = self._witness.roles
         self._hits.take(self._witness.touches(held), roles, now_s)
         if now_s < self._next_s:

@@ -22,6 +22,16 @@ class SimulationWitness:
         self._scene, self._contact, self._impulse = scene, TrueContact(scene), _Impulse(scene)
         arm.after_step = self._impulse.step
 
+    def own_name(self, held: str) -> str | None:
+        """Return the simulation's name of a held object that is perceived by this name; None if it is not known.
+
+        A surface has another name: then it is what the gripper touches, the target first.
+        """
+        if held in self.roles:
+            return held
+        touched = sorted(self._contact.touched, key=lambda name: (self.roles[name] is not Role.TARGET, name))
+        return next((name for name in touched if self.roles[name] is not Role.SUPPORT), None)
+
     def touches(self, held: str | None) -> ContactOnset | None:
         """Return the fastest contact that began since the last call. held: object that the gripper holds."""
         self._impulse.look(held)
