@@ -2,7 +2,7 @@
 
 import os
 import shutil
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import Final, NamedTuple, Self
 
@@ -52,6 +52,7 @@ class Study:
         ConfigurationError if the folder is of another protocol, is in use, or cannot be written.
         """
         self.folder, self.protocol = folder, load_protocol(protocol)
+        self._unremoved: set[int] = set()
         self._prepare(protocol)
         with ExitStack() as stack:
             self.journal = stack.enter_context(StudyJournal(folder / JOURNAL, self.protocol))
@@ -74,7 +75,7 @@ class Study:
         """Take an event, once it is on the disk.
 
         ValueError if it may not come now; FeelaheadError if it cannot be written. Nothing has happened then. But data
-        of a withdrawal that cannot be removed yet are removed at the next start.
+        of a withdrawal that cannot be removed yet are removed with a later event, or at the next start.
         """
         progress = self.journal.progress(event.participant)
         require_next(self.protocol, progress, event)
@@ -83,6 +84,9 @@ class Study:
         if isinstance(event, Ended):
             self._keep(progress.attempts[-1].begun)
         self.journal.add(event)
+        for participant in tuple(self._unremoved):
+            with suppress(FeelaheadError):
+                self._remove(participant)
         if isinstance(event, Withdrew) and self.protocol.withdrawn == "remove":
             self._remove(event.participant)
 
@@ -123,6 +127,7 @@ class Study:
                 self.journal.add(ended)
 
     def _remove(self, participant: int) -> None:
+        self._unremoved.add(participant)
         try:
             for path in (self.folder / TRIALS).glob(f"*p{participant:02d}-*.mcap"):
                 path.unlink()
@@ -132,6 +137,7 @@ class Study:
         except OSError as error:
             raise FeelaheadError(f"participant {participant}: data cannot be removed: {error.strerror}") from error
         self.journal.remove(participant)
+        self._unremoved.remove(participant)
 
     def _prepare(self, protocol: Path) -> None:
         own = self.folder / PROTOCOL

@@ -59,8 +59,15 @@ class _Run:
     """Whether the journal has its end already: a fault, or a withdrawal"""
     closed: bool = False
     fault: str | None = None
+    unwritten: Mapping[str, Any] | None = None
+    """What a page said of its end, and could not be written yet: a fault, or a withdrawal"""
     written_s: float | None = None
     """When it was last tried to write its fault down"""
+
+    @property
+    def failed(self) -> bool:
+        """Whether it has another end than a trial that counts"""
+        return self.fault is not None or self.unwritten is not None
 
 
 class Room:
@@ -123,7 +130,7 @@ class Room:
         if (run := self._run) is None or self._session is None:
             return
         run.closed, run.fault = True, run.fault or error
-        if run.settled or run.fault is not None:
+        if run.settled or run.failed:
             self._write_fault(run, now_s, at_s)
         else:
             self._session.ended(run.stands_since_s is not None, at_s)
@@ -132,7 +139,7 @@ class Room:
     def turn(self, now_s: float, at_s: float) -> Stop | None:
         """Let time pass: write down what could not be; return Stop once, when the trial has had its time."""
         run = self._run
-        if run is not None and run.closed and run.fault is not None:
+        if run is not None and run.closed and run.failed:
             if run.written_s is None or now_s - run.written_s >= _WRITE_AGAIN_S:
                 self._write_fault(run, now_s, at_s)
             return None
@@ -199,7 +206,19 @@ class Room:
             if self._run is None or self._run.stopping:
                 raise ValueError("end: no trial runs; valid: while one does")
             return self._stop(Stop("experimenter"))
-        stop = session.hear(said, now_s, at_s)
+        return self._tell(session, name, said, now_s, at_s)
+
+    def _tell(
+        self, session: Session, name: str, said: Mapping[str, Any], now_s: float, at_s: float
+    ) -> Start | Stop | None:
+        try:
+            stop = session.hear(said, now_s, at_s)
+        except FeelaheadError:
+            if self._run is None or name not in ("failed", "withdrew"):
+                raise
+            # The arm waits for no disk; the pages show the trouble.
+            already, self._run.unwritten = self._run.stopping, said
+            return None if already else self._stop(Stop(name))
         if name != "answered":
             self._ready = False
         if not isinstance(stop, Stop) or self._run is None:
@@ -229,7 +248,10 @@ class Room:
         if not run.settled and self._session is not None:
             run.written_s = now_s
             with contextlib.suppress(FeelaheadError):  # the pages show it as trouble
-                self._session.lost(str(run.fault), at_s)
+                if run.unwritten is None:
+                    self._session.lost(str(run.fault), at_s)
+                else:
+                    self._session.hear(run.unwritten, now_s, at_s)
                 run.settled = True
         self._free()
 

@@ -64,7 +64,12 @@ class Session:
         if isinstance(event, Rested) and (left_s := self._rest_left_s(now_s)):
             raise ValueError(f"rested: {left_s:.0f} s are left; valid: after them")
         step = self._study.next_step(self._participant)
-        self._add(event)
+        try:
+            self._add(event)
+        except FeelaheadError:
+            # One who has withdrawn is stopped, even if their data cannot be removed yet.
+            if not self._study.journal.progress(self._participant).withdrawn:
+                raise
         run, running = self._run, isinstance(event, Failed | Withdrew)
         if isinstance(event, Begun) and isinstance(step, Practice | Trial):
             self._run = _Run(event)

@@ -12,7 +12,7 @@ import pytest
 
 from common.errors import FeelaheadError
 from feelahead.study.balance import most_minutes
-from feelahead.study.folder import Study, read_study
+from feelahead.study.folder import JOURNAL, TRIALS, Study, read_study
 from feelahead.study.records import trial_records
 from feelahead.study.room import Page, Room, Seen
 from feelahead.study.session import Start, Stop
@@ -246,6 +246,33 @@ def test_a_full_disk_holds_the_study_until_there_is_room(
     desk.turn(1.0)
     assert (desk.room.busy, desk.shown()["trouble"]) == (False, None)
     assert desk.rows == [(1, 1, "complete" if failed is None else "fault", failed)]
+
+
+@pytest.mark.parametrize(("event", "broken"), [("withdrew", "fsync"), ("withdrew", "unlink"), ("failed", "fsync")])
+def test_the_sides_stop_even_if_what_ends_the_trial_cannot_be_written(
+    desk: Desk, monkeypatch: pytest.MonkeyPatch, event: str, broken: str
+) -> None:
+    desk.come()
+    desk.begin()
+    desk.see(ARMED)
+
+    def full(*_: object, **__: object) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    with monkeypatch.context() as patch:
+        patch.setattr(f"os.{broken}", full)
+        assert desk.tell(event, reason="Anna felt sick") == Stop(event)
+        assert desk.shown("participant")["console"] is None
+        desk.close()
+        assert [desk.turn(1.0), desk.turn(1.0)] == [None] * 2
+        assert desk.room.busy == (broken == "fsync")
+        assert "No space left on device" in desk.shown()["trouble"]
+    desk.turn(1.0)
+    desk.tell("choose", participant=2)
+    desk.tell("enrolled")
+    assert desk.rows == ([] if event == "withdrew" else [(1, 1, "fault", "Anna felt sick")])
+    assert (b"Anna" in (desk.study.folder / JOURNAL).read_bytes()) == (event == "failed")
+    assert any((desk.study.folder / TRIALS).glob("*p01-*")) == (event == "failed")
 
 
 def test_a_killed_study_goes_on_with_who_was_there(desk: Desk) -> None:
