@@ -37,6 +37,8 @@ from feelahead.study.steps import (
 
 INTERRUPTED: Final = "interrupted"
 """Reason of a fault that nobody reported, as kill -9 or a power cut"""
+NEVER_ARMED: Final = "the arm was never armed"
+"""Reason of a fault, or in an older journal of an exclusion"""
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ from typing import Any, Final, Literal
 from common.errors import FeelaheadError
 from feelahead.study.balance import left_minutes
 from feelahead.study.folder import Study
+from feelahead.study.progress import NEVER_ARMED
 from feelahead.study.schedule import schedule
 from feelahead.study.session import Session, Start, Stop
 from feelahead.study.steps import Done, Practice, Trial, Withdrawn, public
@@ -129,7 +130,7 @@ class Room:
         """Hear that the sides have ended and the recording is closed. error: why the recording is not whole."""
         if (run := self._run) is None or self._session is None:
             return
-        run.closed, run.fault = True, run.fault or error
+        run.closed, run.fault = True, run.fault or error or (None if run.armed else NEVER_ARMED)
         if run.settled or run.failed:
             self._write_fault(run, now_s, at_s)
         else:

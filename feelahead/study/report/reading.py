@@ -2,24 +2,22 @@
 
 from dataclasses import asdict, fields
 from pathlib import Path
-from typing import Final
 
 from common.errors import ConfigurationError
 from common.recording.packages import require_packages
 from feelahead.printing.progress import progress
 from feelahead.study.events import Enrolled
 from feelahead.study.folder import TRIALS, read_study
+from feelahead.study.progress import NEVER_ARMED
 from feelahead.study.records import AnswerRecord, answer_records, trial_records, withdrawn
 from feelahead.study.report.outcomes import Tables
 from feelahead.study.trials.outcome import Outcome, outcome_of
 
-NEVER_ARMED: Final = "the arm was never armed"
-
 
 def read_tables(folder: Path) -> Tables:
-    """Return the tables of the study in `folder`; ConfigurationError for a folder of none, or a damaged recording.
+    """Return the tables of the study in `folder`; ConfigurationError for a folder of none.
 
-    Trials are in the order of participants, plan and attempts.
+    Trials are in the order of participants, plan and attempts. One whose recording cannot be read is excluded.
     """
     require_packages("study", "pandas", extra="study")
     import pandas as pd  # noqa: PLC0415  # large
@@ -32,12 +30,15 @@ def read_tables(folder: Path) -> Tables:
     rows = []
     with progress("reading recordings", float(len(records))) as shown:
         for record in records:
-            complete = record.status == "complete"
-            found = outcome_of(folder / TRIALS / record.recording, protocol.limit_s) if complete else None
-            row = asdict(record) | (nothing if found is None else asdict(found))
-            if complete and found is None:
-                row["excluded"] = record.excluded or NEVER_ARMED
-            rows.append(row)
+            found, why = None, record.excluded
+            if record.status == "complete":
+                try:
+                    found = outcome_of(folder / TRIALS / record.recording, protocol.limit_s)
+                except ConfigurationError as error:
+                    why = why or str(error).removeprefix(f"{folder / TRIALS}/").partition("; valid: ")[0]
+                else:
+                    why = why or (NEVER_ARMED if found is None else None)
+            rows.append(asdict(record) | {"excluded": why} | (nothing if found is None else asdict(found)))
             shown.advance(1.0)
     answers = [asdict(one) for one in answer_records(protocol, events)]
     columns = [field.name for field in fields(AnswerRecord)]

@@ -132,6 +132,16 @@ def test_the_experimenter_ends_a_trial(desk: Desk) -> None:
     assert desk.rows == [(1, 1, "complete", None)]
 
 
+def test_a_trial_in_which_the_arm_was_never_armed_is_a_fault(desk: Desk) -> None:
+    desk.come()
+    desk.begin()
+    desk.see(UP)
+    assert desk.tell("end") == Stop("experimenter")
+    desk.close()
+    desk.place()
+    assert desk.rows == [(1, 1, "fault", "the arm was never armed"), (1, 2, "complete", None)]
+
+
 def test_what_is_lost_is_a_fault_and_what_comes_back_is_none(desk: Desk) -> None:
     desk.come()
     desk.begin()
