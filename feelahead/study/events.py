@@ -1,6 +1,6 @@
 """Events of a study, one a line of its journal; everything else follows from them."""
 
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import msgspec
 from msgspec import Meta
@@ -8,6 +8,7 @@ from msgspec import Meta
 from common.limits import Finite, check_limits
 
 Number = Annotated[int, Meta(ge=1, le=999)]
+EndedBy = Literal["placed", "limit", "experimenter"]
 
 
 class _Event(msgspec.Struct, frozen=True, kw_only=True, tag_field="event", tag=str.lower, forbid_unknown_fields=True):
@@ -52,6 +53,8 @@ class Ended(_OfAttempt, frozen=True, kw_only=True):
 
     success: bool | None = None
     """Whether the target was placed in time; None if it was not heard"""
+    by: EndedBy | None = None
+    """What ended it; None if it was not heard, and in older journals"""
 
 
 class Failed(_OfAttempt, frozen=True, kw_only=True):

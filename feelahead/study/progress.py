@@ -37,6 +37,8 @@ from feelahead.study.steps import (
 
 INTERRUPTED: Final = "interrupted"
 """Reason of a fault that nobody reported, as kill -9 or a power cut"""
+BY_EXPERIMENTER: Final = "ended by the experimenter"
+"""Why a trial that was ended early counts for nothing"""
 NEVER_ARMED: Final = "the arm was never armed"
 """Reason of a fault, or in an older journal of an exclusion"""
 
@@ -50,7 +52,7 @@ class Attempt:
     """open: it is running, or was cut off, as by kill -9"""
     success: bool | None = None
     reason: str | None = None
-    """Reason of a fault"""
+    """Reason of a fault, or why a complete one counts for nothing"""
 
 
 @dataclass(frozen=True)
@@ -92,7 +94,9 @@ class Progress:
                 before = self.attempts if self.open is None else self._last("fault", reason=INTERRUPTED)
                 new = replace(self, attempts=(*before, Attempt(event)), repeatable=False)
             case Ended():
-                new = replace(self, attempts=self._last("complete", success=event.success), repeatable=True)
+                reason = BY_EXPERIMENTER if event.by == "experimenter" else None
+                attempts = self._last("complete", success=event.success, reason=reason)
+                new = replace(self, attempts=attempts, repeatable=True)
             case Failed():
                 new = replace(self, attempts=self._last("fault", reason=event.reason), repeatable=False)
             case Answered():

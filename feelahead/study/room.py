@@ -10,6 +10,7 @@ from typing import Any, Final, Literal
 
 from common.errors import FeelaheadError
 from feelahead.study.balance import left_minutes
+from feelahead.study.events import EndedBy
 from feelahead.study.folder import Study
 from feelahead.study.progress import NEVER_ARMED
 from feelahead.study.schedule import schedule
@@ -56,6 +57,8 @@ class _Run:
     stands_since_s: float | None = None
     lost_since_s: float | None = None
     stopping: bool = False
+    by: EndedBy = "limit"
+    """What ends it, unless it has a fault"""
     settled: bool = False
     """Whether the journal has its end already: a fault, or a withdrawal"""
     closed: bool = False
@@ -123,6 +126,7 @@ class Room:
         if run.fault is not None:
             return self._stop(Stop("fault"))
         if run.stands_since_s is not None and now_s - run.stands_since_s >= _STANDS_S:
+            run.by = "placed"
             return self._stop(Stop("placed"))
         return None
 
@@ -134,7 +138,7 @@ class Room:
         if run.settled or run.failed:
             self._write_fault(run, now_s, at_s)
         else:
-            self._session.ended(run.stands_since_s is not None, at_s)
+            self._session.ended(run.by, at_s)
             self._free()
 
     def turn(self, now_s: float, at_s: float) -> Stop | None:
@@ -206,6 +210,7 @@ class Room:
         if name == "end":
             if self._run is None or self._run.stopping:
                 raise ValueError("end: no trial runs; valid: while one does")
+            self._run.by = "experimenter"
             return self._stop(Stop("experimenter"))
         return self._tell(session, name, said, now_s, at_s)
 

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from common.errors import FeelaheadError
-from feelahead.study.events import Begun, Ended, Event, Failed, Rested, Withdrew, event_of
+from feelahead.study.events import Begun, Ended, EndedBy, Event, Failed, Rested, Withdrew, event_of
 from feelahead.study.folder import Study
 from feelahead.study.protocol import Condition
 from feelahead.study.schedule import Planned
@@ -85,14 +85,14 @@ class Session:
         if self._run is not None:
             self._run.up_s = now_s
 
-    def ended(self, success: bool, at_s: float) -> None:
+    def ended(self, by: EndedBy, at_s: float) -> None:
         """Hear that the trial has come to its end, and that its recording is closed.
 
         An end that cannot be written is written later by `turn`; the pages show the trouble until then.
         """
         if self._run is not None:
             begun = self._run.begun
-            self._run.end = Ended(**_of(begun), at_s=at_s, success=success)
+            self._run.end = Ended(**_of(begun), at_s=at_s, success=by == "placed", by=by)
             self._write_end()
 
     def lost(self, reason: str, at_s: float) -> None:

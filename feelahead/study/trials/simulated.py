@@ -113,6 +113,7 @@ class _Participation:
                 attempt=begun.attempt,
                 practice=begun.practice,
                 success=success,
+                by="placed" if success else "limit",
             )
         )
 

@@ -12,6 +12,7 @@ import pytest
 
 from common.errors import FeelaheadError
 from feelahead.study.balance import most_minutes
+from feelahead.study.events import Ended
 from feelahead.study.folder import JOURNAL, TRIALS, Study, read_study
 from feelahead.study.records import trial_records
 from feelahead.study.room import Page, Room, Seen
@@ -117,6 +118,7 @@ def test_a_trial_has_its_time_from_when_the_arm_is_armed(desk: Desk) -> None:
     desk.close()
     assert desk.rows == [(1, 1, "complete", None)]
     assert desk.study.journal.progress(1).attempts[-1].success is False
+    assert [one.by for one in desk.study.journal.events if isinstance(one, Ended)][-1] == "limit"
 
 
 def test_the_experimenter_ends_a_trial(desk: Desk) -> None:
@@ -129,7 +131,9 @@ def test_the_experimenter_ends_a_trial(desk: Desk) -> None:
     with pytest.raises(ValueError, match="end: no trial runs"):
         desk.tell("end")
     desk.close()
-    assert desk.rows == [(1, 1, "complete", None)]
+    desk.place()
+    assert desk.rows == [(1, 1, "complete", "ended by the experimenter"), (2, 1, "complete", None)]
+    assert [one.by for one in desk.study.journal.events if isinstance(one, Ended)][-2:] == ["experimenter", "placed"]
 
 
 def test_a_trial_in_which_the_arm_was_never_armed_is_a_fault(desk: Desk) -> None:

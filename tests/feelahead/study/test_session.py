@@ -44,7 +44,7 @@ class Room:
     def run(self, success: bool = True) -> Start:
         start = self.start()
         self.now_s += 20.0
-        self.session.ended(success, 1e9 + self.now_s)
+        self.session.ended("placed" if success else "limit", 1e9 + self.now_s)
         return start
 
     def go(self, until: str) -> None:
@@ -110,7 +110,7 @@ def test_a_trial_has_its_time_from_when_the_sides_are_up(study: Study) -> None:
     assert room.session.turn(room.now_s + 45.0) == Stop("time limit")
     assert room.session.turn(room.now_s + 46.0) is None
     assert room.shown()["running"]
-    room.session.ended(False, 0.0)
+    room.session.ended("limit", 0.0)
     assert (room.shown()["running"], room.shown()["number"]) == (False, 2)
 
 
@@ -136,7 +136,7 @@ def test_faults_are_repeated_and_marked_by_side_by_experimenter_and_after_the_en
     ]
     assert room.shown()["faults"] == ["the robot side ended", "the phone rang", "looked away"]
     # A side that ends late says nothing new.
-    room.session.ended(True, 0.0)
+    room.session.ended("placed", 0.0)
     room.session.lost("late", 0.0)
     assert len(_rows(study)) == 4
 
@@ -147,7 +147,7 @@ def test_a_pause_lets_the_trial_end_and_holds_the_next(study: Study) -> None:
     room.start()
     room.say("paused")
     assert room.shown()["running"]
-    room.session.ended(True, 0.0)
+    room.session.ended("placed", 0.0)
     assert room.shown()["step"] == "pause"
     with pytest.raises(ValueError, match="begun does not come now; valid: what goes with pause"):
         room.say("begun")
@@ -186,7 +186,7 @@ def test_who_withdraws_stops_the_sides_and_leaves_a_number(study: Study, running
         room.go("trial")
         room.start()
     assert room.say("withdrew", reason="felt sick") == (Stop("withdrew") if running else None)
-    room.session.ended(True, 0.0)
+    room.session.ended("placed", 0.0)
     assert room.shown()["step"] == "withdrawn"
     assert {path.name[:3] for path in (study.folder / TRIALS).iterdir()} == {"p02"}
     with pytest.raises(ValueError, match="begun does not come now"):
@@ -206,7 +206,7 @@ def test_an_end_that_a_full_disk_refuses_is_written_when_there_is_room(
 
     with monkeypatch.context() as patch:
         patch.setattr(os, "fsync", full)
-        room.session.ended(True, 0.0)
+        room.session.ended("placed", 0.0)
         assert room.session.turn(room.now_s) is None
         assert "No space left on device" in room.shown()["trouble"]
         assert room.shown()["running"]
