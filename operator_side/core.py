@@ -55,7 +55,9 @@ class OperatorSide:
         self.screen: Telemetry | None = None
         """Newest telemetry of the robot side; None before the first."""
         choices = Choices(settings.speed_scale, settings.stick_frame)
-        self.hands = NewestIntent(settings.calibration, choices, swap_sides=settings.swap_sides)
+        self.hands = NewestIntent(
+            settings.calibration, choices, swap_sides=settings.swap_sides, fixed_task=settings.fixed_task
+        )
         self.haptics = Haptics(
             settings.rendering,
             settings.calibration,
@@ -72,7 +74,7 @@ class OperatorSide:
         self._listeners = tuple(listeners)
         self._blindness = Blindness()
         self._standing = LeaseState()
-        self.marker = Marker(self._standing, self._hear)
+        self.marker = Marker(self._standing, self._hear, fixed_task=settings.fixed_task)
 
     @property
     def lease(self) -> LeaseNotice | None:

@@ -22,6 +22,8 @@ class CoreSettings:
     """Share of the full speed that full travel and full deflection command at first"""
     stick_frame: StickFrame = "tool"
     """Frame in which the sticks move and turn the tool at first"""
+    fixed_task: bool = False
+    """Whether marks of episodes, resets and other targets are refused"""
     swap_sides: bool = False
     """Whether left and right are exchanged: triggers, sticks and hold-to-run"""
     seed: int = 0

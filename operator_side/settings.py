@@ -64,6 +64,8 @@ class OperatorSettings(SideOptions):
     stick_frame: StickFrame = "tool"
     """Frame in which the sticks move and turn the tool at first: the tool's, the base's or that of the overview's
     picture. The touchpad changes it. The triggers always move along the tool."""
+    fixed_task: bool = False
+    """Refuse marks of episodes, putting the scene back, and another target: for a study."""
     swap_sides: bool = False
     """Swap left and right: L2 advances, R2 retreats, R1 is held to run, the right stick moves across, the left stick
     turns."""

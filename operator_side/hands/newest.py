@@ -1,5 +1,6 @@
 """Newest intent of the operator, until it expires."""
 
+from dataclasses import replace
 from typing import Final
 
 from operator_side.controller.state import ControllerState
@@ -14,18 +15,24 @@ INTENT_EXPIRES_S: Final = 0.1
 class NewestIntent:
     """Newest intent of the operator, from a controller's states."""
 
-    def __init__(self, calibration: TravelCalibration, choices: Choices, *, swap_sides: bool) -> None:
+    def __init__(
+        self, calibration: TravelCalibration, choices: Choices, *, swap_sides: bool, fixed_task: bool = False
+    ) -> None:
+        """fixed_task: whether no other target can be chosen."""
         self.calibration, self.choices = calibration, choices
         self.intent: OperatorIntent | None = None
         """Newest intent; None before the first state, and once the controller is lost"""
         self.lost_s: float | None = None
         """Time at which the controller was lost; None before a loss, and once the arm has stopped after it"""
-        self._swap_sides = swap_sides
+        self._swap_sides, self._fixed_task = swap_sides, fixed_task
         self._read_s = 0.0
 
     def read(self, state: ControllerState, now_s: float) -> OperatorIntent:
         """Take a controller's state and return the intent made from it."""
-        self.intent = intent = operator_intent(state, self.calibration, swap_sides=self._swap_sides)
+        intent = operator_intent(state, self.calibration, swap_sides=self._swap_sides)
+        if self._fixed_task and intent.next_target:
+            intent = replace(intent, next_target=False)
+        self.intent = intent
         self._read_s = now_s
         self.choices.read(intent)
         return intent

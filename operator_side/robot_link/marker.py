@@ -22,10 +22,17 @@ class Marker:
     """Marks that wait for an answer, and whether an episode is open."""
 
     def __init__(
-        self, standing: LeaseState, hear: Callable[[Literal["marked", "episode"], EpisodeMark, float], None]
+        self,
+        standing: LeaseState,
+        hear: Callable[[Literal["marked", "episode"], EpisodeMark, float], None],
+        *,
+        fixed_task: bool = False,
     ) -> None:
-        """hear: called with each mark made away from the controller (marked), and with each that counts (episode)."""
-        self._standing, self._hear = standing, hear
+        """hear: called with each mark made away from the controller (marked), and with each that counts (episode).
+
+        fixed_task: whether every mark is refused.
+        """
+        self._standing, self._hear, self._fixed_task = standing, hear, fixed_task
         self._counts: dict[str, int] = {}
         self._open = False
         self._held: EpisodeMark | None = None
@@ -48,7 +55,9 @@ class Marker:
     def _ask(self, kind: EpisodeMark, now_s: float) -> None:
         """Count a mark and send it, or refuse it. A reset counts only once the scene was put back."""
         lease = self._standing.lease
-        if lease is None or not self._standing.owns:
+        if self._fixed_task:
+            self._refuse(kind, "the task is fixed")
+        elif lease is None or not self._standing.owns:
             self._refuse(kind, "only the owner may")
         elif kind not in ("start", "reset") and not self._open:
             self._refuse(kind, "no episode has begun; valid after: start")

@@ -7,6 +7,7 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Any, Protocol
 
+from common.episode import EpisodeMark
 from common.protocol.messages import Vector3
 from common.recording.entries import Kind
 from common.recording.topics import Truth
@@ -54,6 +55,12 @@ class TrueStates(Listener):
         self._hits, self._placing = Hits(), Placing()
         self._tick: Tick | None = None
         self._next_s = -math.inf
+
+    def on_episode(self, mark: EpisodeMark, now_s: float) -> None:
+        """Forget the placing once the scene was put back: the target is where it began."""
+        del now_s
+        if mark == "reset":
+            self._placing = Placing()
 
     def on_tick(self, tick: Tick) -> None:
         """Keep the newest tick, for what is held and whether the arm is armed."""

@@ -279,3 +279,11 @@ def test_commands_that_end_mean_stop_and_an_observer_knows_none(
     assert bench.side.summary()["rendering"]["without_history"] == unknown
     # The last command counts until the end of commands is noted, 0.2 s later: δ = 0.25 * 0.296 = 74 mm, w = 0.
     assert unknown or bench.device.strengths[1] == (0,) * 3 + (8,) * 7
+
+
+@pytest.mark.parametrize("fixed_task", [False, True])
+def test_with_a_fixed_task_no_other_target_is_asked_for(fixed_task: bool) -> None:
+    bench = Bench(fixed_task=fixed_task)
+    bench.hands(Button.TRIANGLE, Button.L1)
+    [command] = bench.commands()
+    assert (command.run, command.next_target) == (True, not fixed_task)

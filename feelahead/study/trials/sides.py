@@ -31,4 +31,4 @@ def side_values(planned: Planned, condition: Condition) -> SideValues:
         "law_margin_m": condition.margin_m or MARGIN_M,
         "assist": condition.assist,
     }
-    return SideValues(robot, {"seed": planned.seed, "link": link, "haptics": condition.haptics})
+    return SideValues(robot, {"seed": planned.seed, "link": link, "haptics": condition.haptics, "fixed_task": True})

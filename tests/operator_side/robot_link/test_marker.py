@@ -26,10 +26,10 @@ class Heard(Listener):
 class Desk(Bench):
     """Operator side that hears notices ten times a second while time passes."""
 
-    def __init__(self) -> None:
+    def __init__(self, *, fixed_task: bool = False) -> None:
         super().__init__()
         self.heard = Heard()
-        self.side = OperatorSide(2, "clock", CoreSettings(), [self.heard])
+        self.side = OperatorSide(2, "clock", CoreSettings(fixed_task=fixed_task), [self.heard])
         self.side.receive(encode(self.robot.hello(self.now_s)), self.now_s)
         self.session, self.answer = SessionState.DISARMED, (0, "")
         self.tell()
@@ -98,3 +98,12 @@ def test_a_reset_counts_once_the_robot_side_says_it_is_done(desk: Desk) -> None:
 def test_a_mark_without_an_answer_is_given_up(desk: Desk) -> None:
     assert len(desk.marks(5.0, Button.R3)) == pytest.approx(20, abs=1)
     assert desk.side.marker.take_notes() == ["reset refused: the robot side did not answer"]
+
+
+def test_with_a_fixed_task_no_mark_leaves() -> None:
+    desk = Desk(fixed_task=True)
+    assert desk.marks(0.3, Button.R3) + desk.marks(0.1, Button.UP) == []
+    desk.side.marker.mark("reset", desk.now_s)
+    assert desk.marks(0.3) == []
+    notes = ["reset refused: the task is fixed", "start refused: the task is fixed", "reset refused: the task is fixed"]
+    assert desk.side.marker.take_notes() == notes
