@@ -19,6 +19,8 @@ from robot_side.drivers.mujoco.built_in_scenes import SceneName
 from robot_side.laws.named import LAWS, require_law
 
 ControllerName = Literal["dualsense", "gamepad", "keyboard"]
+STANDS_S: Final = 0.5
+"""Time for which the target must stand until it counts as placed, and the trial ends"""
 MARGIN: Final = "margin"
 """Law that needs `margin_m`"""
 OUTCOMES: Final = (

@@ -13,6 +13,7 @@ from feelahead.study.balance import left_minutes
 from feelahead.study.events import EndedBy
 from feelahead.study.folder import Study
 from feelahead.study.progress import NEVER_ARMED
+from feelahead.study.protocol import STANDS_S
 from feelahead.study.schedule import schedule
 from feelahead.study.session import Session, Start, Stop
 from feelahead.study.steps import Done, Practice, Trial, Withdrawn, public
@@ -24,8 +25,6 @@ _MAY_SAY: Final[Mapping[Page, tuple[str, ...]]] = {
     ),
     "participant": ("ready", "answered", "rested"),
 }
-_STANDS_S: Final = 0.5
-"""Time for which the target must stand until the trial ends"""
 _GONE_S: Final = 3.0
 """Time after which a link or controller that was lost is a fault"""
 _WRITE_AGAIN_S: Final = 1.0
@@ -125,7 +124,7 @@ class Room:
             run.fault = seen.lost
         if run.fault is not None:
             return self._stop(Stop("fault"))
-        if run.stands_since_s is not None and now_s - run.stands_since_s >= _STANDS_S:
+        if run.stands_since_s is not None and now_s - run.stands_since_s >= STANDS_S:
             run.by = "placed"
             return self._stop(Stop("placed"))
         return None

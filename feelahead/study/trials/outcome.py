@@ -1,6 +1,7 @@
 """Outcome of a trial, from its recording alone."""
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -10,6 +11,7 @@ import numpy as np
 
 from common.recording.reading import open_recording
 from common.recording.topics import Truth
+from feelahead.study.protocol import STANDS_S
 
 _TOPIC: Final = "/truth"
 NEAR_MM: Final = 5.0
@@ -21,9 +23,9 @@ class Outcome:
     """What came out of a trial: the columns of the study's table that a recording knows."""
 
     completed: bool
-    """Whether the target was lifted and put down in time, and stood by itself"""
+    """Whether the target was lifted and put down, and had stood by itself for STANDS_S in time"""
     time_s: float | None
-    """Time from arming until it stood; None if it did not"""
+    """Time from arming until it began to stand so; None if it did not"""
     contacts: int
     """Contacts of the gripper with all but the target, and of what it held with obstacles"""
     hit: bool
@@ -42,8 +44,8 @@ class Outcome:
 def outcome_of(recording: Path, limit_s: float) -> Outcome | None:
     """Return the outcome of the trial that the file at `recording` has; None if the arm was never armed.
 
-    It ends once the target stands, `limit_s` after arming, or with the recording. ConfigurationError for a file that is
-    no recording, or has no truth, as with an arm that is not simulated.
+    It ends when the target begins to stand for STANDS_S, `limit_s` after arming, or with the recording.
+    ConfigurationError for a file that is no recording, or has no truth, as with an arm that is not simulated.
     """
     opened = open_recording(recording)
     opened.require((_TOPIC,))
@@ -57,9 +59,9 @@ def outcome(truths: list[Truth], limit_s: float) -> Outcome | None:
     if first is None:
         return None
     began_s = truths[first].time_s
-    stood = next((truth.time_s for truth in truths[first:] if truth.placed), None)
-    completed = stood is not None and stood - began_s <= limit_s
-    end_s = stood if completed and stood is not None else began_s + limit_s
+    stood_s = _stood_s(truth for truth in truths[first:] if truth.time_s <= began_s + limit_s)
+    completed = stood_s is not None
+    end_s = began_s + limit_s if stood_s is None else stood_s
     those = [truth for truth in truths[first:] if truth.time_s <= end_s]
     before, last = truths[max(first - 1, 0)], those[-1]
     tool_m = np.array([truth.tool_m for truth in those])
@@ -76,3 +78,13 @@ def outcome(truths: list[Truth], limit_s: float) -> Outcome | None:
         least_mm=None if np.isinf(gaps_mm.min()) else float(gaps_mm.min()),
         exposure_s=float(np.diff(times_s)[gaps_mm[:-1] < NEAR_MM].sum()),
     )
+
+
+def _stood_s(truths: Iterable[Truth]) -> float | None:
+    """Return when the target began to stand for STANDS_S; None if it never did."""
+    since_s: float | None = None
+    for truth in truths:
+        since_s = None if not truth.placed else truth.time_s if since_s is None else since_s
+        if since_s is not None and truth.time_s - since_s >= STANDS_S - 1e-9:
+            return since_s
+    return None

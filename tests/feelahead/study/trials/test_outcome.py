@@ -62,3 +62,13 @@ def test_without_arming_nothing_came_out_and_what_is_far_has_no_distance() -> No
     found = outcome(truths(3.0, obstacle_mm=lambda _: None), LIMIT_S)
     assert found is not None
     assert (found.least_mm, found.exposure_s) == (None, 0.0)
+
+
+def test_a_target_that_stands_for_a_moment_has_not_been_placed_yet() -> None:
+    found = outcome(truths(9.0, placed=lambda t: 2.0 <= t < 2.45 or t >= 3.0), LIMIT_S)
+    assert found is not None
+    assert found.time_s == pytest.approx(2.0)
+    for placed in (lambda t: 2.0 <= t < 2.45, lambda t: t >= 1.0 + LIMIT_S - 0.45):
+        found = outcome(truths(9.0, placed=placed), LIMIT_S)
+        assert found is not None
+        assert (found.completed, found.time_s) == (False, None)
