@@ -112,8 +112,9 @@ class _Run:
         if isinstance(asked, Start):
             try:
                 self._sides = TrialSides(asked, self._desk, self._port)
-            except (FeelaheadError, OSError):
+            except (FeelaheadError, OSError) as error:
                 self._failed = Seen(failed="the recorder could not be started")
+                self._desk.note("the recorder could not be started", str(error))
         elif isinstance(asked, Stop):
             self._failed = None
             if self._sides is not None:

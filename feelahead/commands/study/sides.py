@@ -44,13 +44,18 @@ class Desk:
         """File with the address of the participant's page"""
         return self.folder / "back"
 
+    def note(self, what: str, reason: str) -> None:
+        """Add a line to the log, if there is room on the disk."""
+        with contextlib.suppress(OSError), self.log.open("a", encoding="utf-8") as file:
+            file.write(f"{json.dumps({'what': what, 'reason': reason})}\n")
+
 
 class TrialSides:
     """Both sides from their start to their end. Only `__init__` and the thread that `close` starts may block."""
 
     def __init__(self, asked: Asked, desk: Desk, console_port: int) -> None:
         """Start recorder and sides; FeelaheadError if the recorder cannot be started."""
-        self._log, self._seen = desk.log, Seen()
+        self._desk, self._seen = desk, Seen()
         values, socket = side_values(asked.planned, asked.condition), desk.folder / f"{asked.recording.stem}.socket"
         self._recorder = RecorderProcess(asked.recording, socket)
         self._said, self._start = Said(), Start(values.robot["link"], time.monotonic())
@@ -113,7 +118,7 @@ class TrialSides:
             side.stop()
         error = self._recorder.finish()["error"]
         if error is not None:
-            self._note("recorder", str(error))
+            self._desk.note("recorder", str(error))
         self._stack.close()
         return None if error is None else "the recorder was lost"
 
@@ -133,11 +138,7 @@ class TrialSides:
 
     def _fail(self, words: str, reason: str) -> None:
         self._seen = replace(self._seen, failed=words)
-        self._note(words, reason)
-
-    def _note(self, what: str, reason: str) -> None:
-        with contextlib.suppress(OSError), self._log.open("a", encoding="utf-8") as file:
-            file.write(f"{json.dumps({'what': what, 'reason': reason})}\n")
+        self._desk.note(words, reason)
 
 
 def _reason(side: SideProcess) -> str:

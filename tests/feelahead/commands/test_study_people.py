@@ -1,5 +1,6 @@
 """What happens between the pages, the room and the sides of a study, with made-up sides."""
 
+import json
 from collections.abc import Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
@@ -10,7 +11,7 @@ import pytest
 
 from common.errors import ConfigurationError
 from feelahead.commands.study import people
-from feelahead.commands.study.people import KEPT, run_people
+from feelahead.commands.study.people import KEPT, LOG, run_people
 from feelahead.commands.study.server import PageServer, Said
 from feelahead.commands.study.sides import Desk
 from feelahead.study.folder import Study
@@ -118,3 +119,6 @@ def test_a_recorder_that_cannot_start_is_a_fault_and_the_trial_comes_again(
     [attempt] = study.journal.progress(1).attempts
     assert (attempt.status, attempt.reason) == ("fault", "the recorder could not be started")
     assert clock.shown["experimenter"]["attempt"] == 2
+    assert [json.loads(line) for line in (study.folder / LOG).read_text().splitlines()] == [
+        {"what": "the recorder could not be started", "reason": "--record: No space left on device"}
+    ]
