@@ -9,7 +9,7 @@ from typing import Final, NamedTuple, Self
 from common.errors import ConfigurationError, FeelaheadError
 from common.files.output_file import require_folder
 from common.files.synced_lines import sync_folder
-from feelahead.study.events import Begun, Ended, Event, Withdrew
+from feelahead.study.events import Begun, Ended, Enrolled, Event, Withdrew
 from feelahead.study.journal import StudyJournal, read_events
 from feelahead.study.progress import require_next, step_after
 from feelahead.study.protocol import Protocol, load_protocol
@@ -66,6 +66,15 @@ class Study:
 
     def __exit__(self, *_: object) -> None:
         self.journal.__exit__()
+
+    def require_all(self, *, simulated: bool) -> None:
+        """Raise ConfigurationError if people and simulated persons would share the folder."""
+        for event in self.journal.events:
+            if isinstance(event, Enrolled) and event.simulated != simulated:
+                found, valid = ("a person", "people") if simulated else ("simulated", "simulated persons")
+                raise ConfigurationError(
+                    f"{self.folder}: participant {event.participant} is {found}; valid: a new folder, or only {valid}"
+                )
 
     def next_step(self, participant: int) -> Step:
         """Return what comes next for a participant."""

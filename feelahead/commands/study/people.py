@@ -38,7 +38,11 @@ class Kept(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 def run_people(study: Study, participant: int | None) -> None:
-    """Serve the pages of a study, and run its trials, until Ctrl-C."""
+    """Serve the pages of a study, and run its trials, until Ctrl-C.
+
+    ConfigurationError if simulated persons take part in this study.
+    """
+    study.require_all(simulated=False)
     with (
         _server(study.folder / KEPT) as server,
         tempfile.TemporaryDirectory(prefix="feelahead-") as folder,

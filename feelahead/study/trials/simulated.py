@@ -142,7 +142,11 @@ class _Participation:
 
 
 def run_simulated(study: Study, participants: int, workers: int) -> None:
-    """Let participants 1 to `participants` do what is left of the study. The figures do not depend on `workers`."""
+    """Let participants 1 to `participants` do what is left of the study. The figures do not depend on `workers`.
+
+    ConfigurationError if people take part in this study.
+    """
+    study.require_all(simulated=True)
     people = deque(_Participation(study, number) for number in range(1, participants + 1))
     protocol = study.protocol
     left = sum(len(schedule(protocol, one.number)) - len(study.journal.progress(one.number).complete) for one in people)

@@ -6,6 +6,7 @@ import random
 import subprocess
 import sys
 from collections import Counter
+from collections.abc import Callable
 from pathlib import Path
 
 import msgspec
@@ -15,6 +16,7 @@ from hypothesis import strategies as st
 
 from common.errors import ConfigurationError, FeelaheadError
 from common.files import synced_lines
+from feelahead.commands.study.people import run_people
 from feelahead.study import folder as folder_module
 from feelahead.study.events import Begun, Enrolled, Failed, Paused, Withdrew
 from feelahead.study.folder import JOURNAL, TRIALS, Study, read_study
@@ -24,6 +26,7 @@ from feelahead.study.protocol import Protocol
 from feelahead.study.records import recording_name, trial_records, withdrawn
 from feelahead.study.schedule import schedule
 from feelahead.study.steps import Done, Practice, Trial, Withdrawn
+from feelahead.study.trials.simulated import run_simulated
 from tests.feelahead.study.driving import begun, do_all, do_step, end_of, fault_of
 from tests.feelahead.study.protocols import protocol
 from tests.helpers.refusal import refusal
@@ -309,6 +312,16 @@ def test_a_folder_of_something_else_is_refused(file: Path, tmp_path: Path) -> No
     assert "has other files" in refusal(Study, tmp_path, file)
     assert "holds no protocol.toml" in refusal(read_study, tmp_path)
     assert "/proc" in refusal(Study, Path("/proc/study"), file)
+
+
+@pytest.mark.parametrize("simulated", [False, True])
+def test_people_and_simulated_persons_never_share_a_folder(file: Path, tmp_path: Path, *, simulated: bool) -> None:
+    with Study(tmp_path / "study", file) as study:
+        study.add(Enrolled(participant=1, at_s=0.0, simulated=simulated))
+        runs: tuple[Callable[[], None], ...] = (lambda: run_people(study, None), lambda: run_simulated(study, 2, 1))
+        assert "participant 1 is " in refusal(runs[not simulated])
+        study.require_all(simulated=simulated)
+        assert len(study.journal.events) == 1
 
 
 @pytest.mark.parametrize("line", [b"{}\n", b"\xff\n", b'{"event": "slept", "participant": 1, "at_s": 0}\n'])
