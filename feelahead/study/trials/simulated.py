@@ -18,7 +18,7 @@ from feelahead.study.events import Answered, Begun, Consented, Ended, Enrolled, 
 from feelahead.study.folder import TRIALS, Study
 from feelahead.study.protocol import Condition
 from feelahead.study.records import recording_name
-from feelahead.study.schedule import Planned, schedule
+from feelahead.study.schedule import Planned, schedule, seed_of
 from feelahead.study.steps import Consent, Enrol, Pause, Practice, Questions, Rest, Trial
 from feelahead.study.trials.outcome import Outcome, outcome_of
 from feelahead.study.trials.participants import Participant
@@ -40,6 +40,8 @@ class Task:
     planned: Planned
     condition: Condition
     person: PersonSettings
+    person_seed: int
+    """Seed of what the person does: another under each condition, as nobody errs twice alike"""
     limit_s: float
     recording: Path
 
@@ -48,7 +50,8 @@ def run_task(task: Task) -> tuple[float, Outcome | None]:
     """Run a trial into its recording; return how long it took, in virtual time, and what came out."""
     planned, condition = task.planned, task.condition
     values = side_values(planned, condition)
-    robot, operator = RobotSettings(**values.robot), OperatorSettings(**values.operator, person=task.person)
+    robot = RobotSettings(**values.robot)  # its seed draws the link, too
+    operator = OperatorSettings(**values.operator | {"seed": task.person_seed, "person": task.person})
     task.recording.unlink(missing_ok=True)
     longest_s = task.limit_s + _ARMING_S + 4e-3 * planned.delay_ms
     with Episode(robot=robot, operator=operator, person=GRASPING, sampled=False) as episode:
@@ -120,8 +123,16 @@ class _Participation:
     def _task(self, planned: Planned, recording: Path) -> Task:
         protocol = self._study.protocol
         practised = sum(one.status == "complete" for one in self._study.journal.progress(self.number).attempts)
-        person = self._mind.at(practised, planned.seed)
-        return Task(self.number, planned, protocol.conditions[planned.condition], person, protocol.limit_s, recording)
+        seed = seed_of([planned.seed, list(protocol.conditions).index(planned.condition)])
+        return Task(
+            self.number,
+            planned,
+            protocol.conditions[planned.condition],
+            self._mind.at(practised, seed),
+            seed,
+            protocol.limit_s,
+            recording,
+        )
 
     def _answers(self, asked: Questions) -> dict[str, float]:
         study, limit_s = self._study, self._study.protocol.limit_s

@@ -1,5 +1,7 @@
 """A whole study with simulated participants: the same figures with one and two workers, and after an interruption."""
 
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import AbstractContextManager
 from pathlib import Path
 
 import pandas
@@ -8,7 +10,10 @@ import pytest
 from feelahead.study.events import Begun
 from feelahead.study.folder import Study
 from feelahead.study.report.reading import read_tables
+from feelahead.study.trials import participants, simulated
 from feelahead.study.trials.simulated import run_simulated
+from operator_side.settings import OperatorSettings
+from robot_side.settings import RobotSettings
 
 PROTOCOL = """
 name = "Small"
@@ -34,6 +39,40 @@ def run(folder: Path, protocol: Path, workers: int) -> tuple[pandas.DataFrame, p
     tables = read_tables(folder)
     assert tables.simulated
     return tables.trials, tables.answers
+
+
+def test_simulated_persons_err_otherwise_under_each_condition(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    began: list[tuple[RobotSettings, OperatorSettings]] = []
+
+    class Nothing(AbstractContextManager["Nothing"]):
+        """An episode that is over at once."""
+
+        time_s, done = 1.0, True
+
+        def __init__(self, robot: RobotSettings, operator: OperatorSettings, **_: object) -> None:
+            began.append((robot, operator))
+
+        def __exit__(self, *_: object) -> None:
+            pass
+
+        def record(self, recording: Path) -> None:
+            recording.write_text("")
+
+    monkeypatch.setattr(simulated, "Episode", Nothing)
+    monkeypatch.setattr(simulated, "processes", ThreadPoolExecutor)
+    monkeypatch.setattr(simulated, "outcome_of", lambda *_: None)
+    monkeypatch.setattr(participants, "_MOST_LAPSES", 1.0)
+    protocol = tmp_path / "small.toml"
+    protocol.write_text(PROTOCOL.replace("trials = 1", "trials = 20"))
+    with Study(tmp_path / "study", protocol) as study:
+        run_simulated(study, 1, 1)
+    off = {robot.seed: operator for robot, operator in began if not operator.haptics}
+    felt = {robot.seed: operator for robot, operator in began if operator.haptics}
+    assert len(off) == 20
+    assert off.keys() == felt.keys()
+    assert not {one.seed for one in off.values()} & {one.seed for one in felt.values()}
+    lapses = [((off[seed].person.trust == 0.0), (felt[seed].person.trust == 0.0)) for seed in off]
+    assert {(True, False), (False, True)} <= set(lapses)
 
 
 @pytest.mark.long
