@@ -56,7 +56,7 @@ class Effect:
     """ratio, or difference (of a share: in 0 to 1)"""
     effect: float | None
     low: float | None
-    """End of the 95 % interval by a bootstrap over participants; None for fewer than three"""
+    """End of the 95 % interval by a bootstrap over participants; None for fewer than three, or all alike"""
     high: float | None
 
 

@@ -3,6 +3,7 @@
 Shares and amounts: generalized estimating equations with an exchangeable correlation within participants, and Mancl's
 and DeRouen's covariance, as participants are few (Biometrics 57, 2001). Others: a mixed linear model with an intercept
 and a slope of the condition for each participant. All are judged by Student's t with one degree less than participants.
+Where all participants differ alike, the spread between persons is unknown: the exact test stands for the model.
 statsmodels' Bayesian binomial model gives an approximate posterior, which is too narrow to be a test; it is not used.
 """
 
@@ -15,12 +16,15 @@ from scipy.stats import t
 
 from common.arrays import FloatArray
 from feelahead.study.report.outcomes import Kind, scale
-from feelahead.study.report.participants import paired_t
+from feelahead.study.report.participants import alike_p, are_alike, paired_t
 
 _FEWEST: Final = 3
 """Participants for whom a model is fitted"""
 _GEE: Final = {Kind.SHARE: ("logistic GEE", "odds ratio"), Kind.AMOUNT: ("log-linear GEE", "ratio of means")}
 _LINEAR_GEE: Final = "linear GEE"
+EXACT: Final = "exact test of sign changes"
+ALIKE: Final = "all participants alike"
+"""Why there is no interval, and the exact test stands for a model"""
 
 
 @dataclass(frozen=True)
@@ -50,10 +54,13 @@ def fit(rows: Any, kind: Kind, first: str) -> Fit:
         return Fit("none", note=f"{count} participants; a model needs {_FEWEST}")
     rows = rows.sort_values(["participant", "condition", "delay_ms", "scene", "repeat"])
     values = np.asarray(scale(kind, rows.value), dtype=np.float64)
-    if np.ptp(values) == 0.0:
-        return Fit("none", "difference", 0.0, 0.0, 0.0, 1.0, "all values are equal")
+    differences = _differences(rows, values, first)
+    if are_alike(differences):
+        factor, middle = kind is Kind.FACTOR, float(differences.mean())
+        measure, estimate = ("ratio", float(np.exp(middle))) if factor else ("difference", middle)
+        return Fit(EXACT, measure, estimate, p=float(alike_p(middle, count)), note=ALIKE)
     if kind is Kind.ANSWER:
-        return _paired(rows, first)
+        return _paired(differences)
     design, groups = _design(rows, first), rows.participant.to_numpy()
     if kind is Kind.SHARE or kind is Kind.AMOUNT:
         return _estimated(design, values, groups, kind)
@@ -148,9 +155,14 @@ def _fit(
     return Fit(model, measure, middle, low, high, p, note)
 
 
-def _paired(rows: Any, first: str) -> Fit:
-    wide = rows.pivot_table(index="participant", columns="condition", values="value")
-    differences = (wide[first] - wide.drop(columns=first).iloc[:, 0]).dropna().to_numpy()
+def _differences(rows: Any, values: FloatArray, first: str) -> FloatArray:
+    """Return each participant's mean under the first condition less that under the other; shape (participants,)."""
+    wide = rows.assign(scaled=values).pivot_table(index="participant", columns="condition", values="scaled")
+    found: FloatArray = (wide[first] - wide.drop(columns=first).iloc[:, 0]).dropna().to_numpy(np.float64)
+    return found
+
+
+def _paired(differences: FloatArray) -> Fit:
     found = paired_t(differences)
     if found is None:
         return Fit("none", note=f"{len(differences)} participants; a test needs {_FEWEST}")

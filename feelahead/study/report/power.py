@@ -12,6 +12,7 @@ from common.errors import ConfigurationError
 from feelahead.study.protocol import Contrast, Protocol
 from feelahead.study.report.contrasts import pairs_of
 from feelahead.study.report.outcomes import Kind, Tables, measured, outcome_of
+from feelahead.study.report.participants import alike_p, are_alike
 
 LEVEL: Final = 0.05
 ASKED: Final = (0.8, 0.9)
@@ -129,7 +130,7 @@ def _differences(tables: Tables) -> tuple[tuple[Contrast, ...], FloatArray]:
 
 
 def _paired_t_p(differences: FloatArray, wider: FloatArray) -> FloatArray:
-    """Return Student's two-sided p over the last axis; 1 where all differences are zero.
+    """Return Student's two-sided p over the last axis; where all differences are alike, that of the exact test.
 
     differences: (contrasts, resamples, participants). wider: factors of the standard error, (contrasts, 1).
     """
@@ -137,7 +138,8 @@ def _paired_t_p(differences: FloatArray, wider: FloatArray) -> FloatArray:
     middles, spreads = differences.mean(axis=-1), differences.std(axis=-1, ddof=1)
     with np.errstate(divide="ignore", invalid="ignore"):
         p = 2.0 * t.sf(np.abs(middles) / (wider * spreads) * np.sqrt(count), count - 1)
-    return np.where(np.isnan(p), 1.0, p)
+    found: FloatArray = np.where(are_alike(differences), alike_p(middles, count), p)
+    return found
 
 
 def _holm(p: FloatArray, families: Sequence[str]) -> FloatArray:

@@ -15,7 +15,8 @@ _STATES: Final = ("complete", "fault", "withdrawn")
 def cells(tables: Tables) -> Any:
     """Return a frame with a row for each outcome, condition and delay: participants, trials, value, low, high.
 
-    value: the mean over participants of their means. low, high: its 95 % interval, not a number for fewer than three.
+    value: the mean over participants of their means. low, high: its 95 % interval, not a number for fewer than
+    three, or all alike.
     """
     return _summed(tables, OUTCOMES.values(), ["condition", "delay_ms"])
 

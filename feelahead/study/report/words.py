@@ -6,6 +6,7 @@ import numpy as np
 
 from feelahead.study.protocol import Condition, Contrast, Protocol
 from feelahead.study.report.contrasts import Compared, Effect
+from feelahead.study.report.models import ALIKE
 from feelahead.study.report.outcomes import Kind, Outcome, outcome_of
 
 ABSENT: Final = "–"
@@ -74,6 +75,8 @@ def sentence(one: Compared) -> str:
         f" {one.contrast.first}, {in_unit(outcome, effect.value_second)} with {one.contrast.second} ({mean} of"
         f" {effect.participants} participants); {effect.measure} {effect_words(outcome, effect)}"
     )
+    if one.fit.note == ALIKE:
+        words += f" ({ALIKE})"
     if one.p_holm is None:
         return f"{words}; not tested: {one.fit.note}."
     found = "a difference" if one.p_holm <= 0.05 else "no difference is shown, which does not show that there is none"
@@ -109,6 +112,7 @@ def models(protocol: Protocol) -> tuple[str, ...]:
         "Mixed models have an intercept and a slope of the condition for each participant; without convergence the"
         " intercept alone.",
         "All are judged by Student’s t with one degree of freedom less than participants.",
+        "Where all participants differ alike, there is no interval, and the exact test takes the place of the model.",
     )
     rest = (
         "Pairs are trials of a participant with the same delay, scene and repetition, which share their seed.",

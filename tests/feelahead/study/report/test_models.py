@@ -90,10 +90,20 @@ def test_without_convergence_slopes_are_left_out_and_it_is_said(monkeypatch: pyt
 
 def test_what_cannot_be_fitted_is_none_and_says_why() -> None:
     equal = fit(balanced(np.zeros((PEOPLE, 2, 1, 6))), Kind.SHARE, "a")
-    assert (equal.p, equal.estimate, equal.note) == (1.0, 0.0, "all values are equal")
+    assert (equal.p, equal.estimate, equal.note) == (1.0, 0.0, "all participants alike")
     rows = balanced(hits())
     few = fit(rows[rows.participant < 2], Kind.SHARE, "a")
     assert (few.p, few.note) == (None, "2 participants; a model needs 3")
+
+
+@pytest.mark.parametrize("kind", list(Kind))
+def test_where_all_participants_differ_alike_there_is_no_interval_and_p_is_exact(kind: Kind) -> None:
+    values = np.ones((PEOPLE, 2, 1, 6))
+    values[:, 1, 0, :3] = 1.0 / np.e if kind is Kind.FACTOR else 0.0
+    values[::2] = values[::2, :, :, ::-1]  # not the same trials
+    found = fit(balanced(values), kind, "a")
+    assert found.estimate == pytest.approx(np.exp(0.5) if kind is Kind.FACTOR else 0.5)
+    assert (found.low, found.high, found.p, found.note) == (None, None, 2.0 / 2**PEOPLE, "all participants alike")
 
 
 def test_answers_are_compared_by_the_paired_t() -> None:

@@ -35,7 +35,6 @@ def test_the_bootstraps_interval_is_as_wide_as_students_where_that_is_right() ->
     # Without the widening, 0.84 times.
     assert (high - low) / (student.high - student.low) == pytest.approx(1.0, abs=0.06)
     assert mean_interval(values, seed=2) == (low, high)
-    assert mean_interval(np.full(4, 0.3), seed=0) == (0.3, 0.3)
     assert mean_interval(values[:2], seed=0) is None
 
 
@@ -61,5 +60,15 @@ def test_the_paired_t_is_scipys() -> None:
     found = paired_t(first - second)
     assert found is not None
     assert found[0] == pytest.approx(ttest_rel(first, second).pvalue)
-    assert paired_t(np.zeros(4)) == (1.0, 0.0, 0.0)
     assert paired_t(np.ones(2)) is None
+
+
+def test_without_a_spread_between_participants_there_is_no_interval() -> None:
+    values = np.array([3.0, 3.0, 2.0, 2.0]) / 6.0 - np.array([2.0, 2.0, 1.0, 1.0]) / 6.0
+    assert np.ptp(values) > 0.0  # by rounding
+    assert mean_interval(values, seed=0) is None
+    assert share_interval(values, seed=0) is None
+    assert paired_t(values) is None
+    assert cohens_d_z(values) is None
+    assert sign_change_p(values, seed=0) == 2.0 / 2**4
+    assert sign_change_p(np.full(40, 0.1), seed=0) == 2.0 / 2**40

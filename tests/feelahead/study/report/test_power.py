@@ -9,6 +9,7 @@ from feelahead.study.report.contrasts import compare
 from feelahead.study.report.outcomes import Tables
 from feelahead.study.report.power import balanced_sizes, plan
 from feelahead.study.report.preregistration import preregistration
+from feelahead.study.report.words import sentence
 from tests.feelahead.study.made_up import PROTOCOL, made_up
 
 TIME = Contrast("time_s", "off", "swept")
@@ -43,6 +44,15 @@ def test_a_test_more_in_the_family_takes_power(pool: Tables) -> None:
     untold = plan(asking(replace(pool, answers=pool.answers.iloc[:0]), TIME, Contrast("tlx", "off", "swept")), (12,))
     assert [one.outcome for one in untold.untold] == ["tlx"]
     assert untold.rows[0].power < alone.power
+
+
+def test_alike_differences_count_as_in_the_exact_test(pool: Tables) -> None:
+    pool = asking(replace(pool, trials=pool.trials.copy()), Contrast("hit", "off", "swept"))
+    pool.trials["hit"] = pool.trials.condition == "off"
+    assert [row.power for row in plan(pool, (4, 6, 8), effects=(1.0,)).rows] == [0.0, 1.0, 1.0]
+    [found] = compare(pool)
+    assert (found.effect.effect, found.effect.low, found.fit.p) == (1.0, None, found.p_exact)
+    assert "difference 100 points – (all participants alike)" in sentence(found)
 
 
 def test_the_smallest_number_is_one_from_which_power_stays(pool: Tables) -> None:
