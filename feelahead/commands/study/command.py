@@ -66,7 +66,8 @@ class PlanSettings:
     protocol: _Protocol = None
     """Protocol of the study."""
     pool: Annotated[Path | None, tyro.conf.arg(metavar="DIR")] = None
-    """Folder of a study with simulated persons, from whom participants are drawn."""
+    """Folder of a study with simulated persons, from whom participants are drawn. Its protocol has the same conditions,
+    contrasts, delays, scenes, trials and limit."""
 
 
 @dataclass(frozen=True)
@@ -111,9 +112,10 @@ def _plan(settings: PlanSettings) -> None:
     protocol = load_protocol(_given(settings.protocol, "PROTOCOL.toml"))
     planned = None
     if settings.pool is not None:
-        planned = _late("feelahead.study.report.power").plan(
-            _late("feelahead.study.report.reading").read_tables(settings.pool)
-        )
+        power = _late("feelahead.study.report.power")
+        pool = _late("feelahead.study.report.reading").read_tables(settings.pool)
+        power.require_pool(protocol, pool)
+        planned = power.plan(pool)
     sys.stdout.write(_late("feelahead.study.report.preregistration").preregistration(protocol, planned))
 
 

@@ -17,6 +17,8 @@ from feelahead.study.report.participants import alike_p, are_alike
 LEVEL: Final = 0.05
 ASKED: Final = (0.8, 0.9)
 """Powers for which the smallest number of participants is told"""
+_SHARED: Final = ("conditions", "contrasts", "delays_ms", "scenes", "trials", "limit_s")
+"""What a pool's protocol has to have in common with the protocol that is planned"""
 _MOST: Final = 64
 """Participants up to which it is looked for"""
 
@@ -65,6 +67,15 @@ def balanced_sizes(protocol: Protocol) -> tuple[int, ...]:
     count = len(protocol.conditions)
     period = 2 * count if count % 2 else count
     return tuple(range(period, _MOST + 1, period))
+
+
+def require_pool(protocol: Protocol, pool: Tables) -> None:
+    """Raise ConfigurationError if participants of `pool` cannot stand for those of a study by this protocol."""
+    if not pool.simulated:
+        raise ConfigurationError("--pool: people took part in it; valid: a study with simulated persons")
+    other = [name for name in _SHARED if getattr(protocol, name) != getattr(pool.protocol, name)]
+    if other:
+        raise ConfigurationError(f"--pool: has other {', '.join(other)}; valid: a pool that has those of the protocol")
 
 
 def plan(

@@ -1,11 +1,16 @@
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from common.errors import ConfigurationError
 from feelahead.commands.study.command import study
 from feelahead.study.folder import Study
+from feelahead.study.protocol import load_protocol
 from tests.feelahead.study.driving import do_all, do_step
+from tests.feelahead.study.made_up import PROTOCOL, made_up
+from tests.helpers.refusal import refusal
 from tests.helpers.repository import ROOT
 
 EXAMPLE = ROOT / "examples" / "study.toml"
@@ -61,6 +66,34 @@ def test_a_study_that_was_begun_shows_where_it_is_and_no_condition(
     rows = [line for line in capsys.readouterr().out.splitlines() if line.startswith("|")]
     words = [[word.strip() for word in row.split("|")[1:-1]] for row in rows]
     assert words[-2:] == [["2", "60", "0", "done"], ["7", "0", "0", "practice"]]
+
+
+@pytest.mark.parametrize(
+    ("simulated", "changed", "words"),
+    [
+        (False, {}, "--pool: people took part in it"),
+        (True, {"limit_s": 30.0}, "--pool: has other limit_s;"),
+        (True, {"scenes": ("wall",), "contrasts": ()}, "--pool: has other contrasts, scenes;"),
+    ],
+)
+def test_a_pool_that_cannot_stand_for_the_study_is_refused(
+    monkeypatch: pytest.MonkeyPatch, simulated: bool, changed: dict[str, Any], words: str
+) -> None:
+    made = made_up(people=1)
+    pool = replace(made, protocol=replace(load_protocol(EXAMPLE), **changed), simulated=simulated)
+    monkeypatch.setattr("feelahead.study.report.reading.read_tables", lambda _: pool)
+    assert words in refusal(study, ["plan", str(EXAMPLE), "--pool", "POOL"])
+
+
+def test_a_pool_of_another_seed_and_number_stands_for_the_study(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    planned = replace(PROTOCOL, seed=1, participants=8)
+    pool = replace(made_up(people=4), simulated=True)
+    monkeypatch.setattr("feelahead.commands.study.command.load_protocol", lambda _: planned)
+    monkeypatch.setattr("feelahead.study.report.reading.read_tables", lambda _: pool)
+    assert study(["plan", str(EXAMPLE), "--pool", "POOL"]) == 0
+    assert "from 4 simulated participants" in capsys.readouterr().out
 
 
 def test_what_needs_more_packages_names_them(monkeypatch: pytest.MonkeyPatch) -> None:
