@@ -68,6 +68,8 @@ class Tables:
     answers: Any
     withdrew: tuple[int, ...] = ()
     """Numbers of participants who withdrew; if the protocol removes their data, the frames lack them"""
+    enrolled: tuple[int, ...] = ()
+    """Numbers of all participants by the journal, also of those who never began a trial"""
     simulated: bool = False
     """Whether no people took part, which the page says"""
 

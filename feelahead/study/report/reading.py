@@ -9,7 +9,7 @@ from feelahead.printing.progress import progress
 from feelahead.study.events import Enrolled
 from feelahead.study.folder import TRIALS, read_study
 from feelahead.study.progress import NEVER_ARMED
-from feelahead.study.records import AnswerRecord, answer_records, trial_records, withdrawn
+from feelahead.study.records import AnswerRecord, answer_records, participants_of, trial_records, withdrawn
 from feelahead.study.report.outcomes import Tables
 from feelahead.study.trials.outcome import Outcome, outcome_of
 
@@ -42,6 +42,7 @@ def read_tables(folder: Path) -> Tables:
             shown.advance(1.0)
     answers = [asdict(one) for one in answer_records(protocol, events)]
     columns = [field.name for field in fields(AnswerRecord)]
-    simulated = any(isinstance(event, Enrolled) and event.simulated for event in events)
+    enrolled = [event for event in events if isinstance(event, Enrolled)]
+    simulated = any(event.simulated for event in enrolled)
     frames = pd.DataFrame(rows), pd.DataFrame(answers, columns=columns)
-    return Tables(protocol, *frames, withdrawn(events), simulated=simulated)
+    return Tables(protocol, *frames, withdrawn(events), participants_of(enrolled), simulated=simulated)

@@ -68,7 +68,8 @@ def flow(tables: Tables, found: tuple[Compared, ...]) -> tuple[tuple[str, int], 
     contrasts = (("participants in the contrast with fewest", min(counted)),) if counted else ()
     return (
         ("participants planned", tables.protocol.participants),
-        ("participants who began", len({*trials.participant, *tables.withdrew})),
+        ("participants who were enrolled", len(tables.enrolled)),
+        ("of these without a trial in the data", len({*tables.enrolled} - {*trials.participant})),
         (f"participants who withdrew (data: {tables.protocol.withdrawn})", len(tables.withdrew)),
         ("participants with trials that count", tables.analysed.participant.nunique()),
         *contrasts,

@@ -71,7 +71,8 @@ def made_up(
             place = {"participant": participant, "block": block, "condition": condition}
             asked = ((question.name, generator.choice(question.values)) for question in protocol.questions)
             answers += [place | {"item": name, "value": float(value)} for name, value in asked]
-    return Tables(protocol, pd.DataFrame(trials), pd.DataFrame(answers))
+    enrolled = tuple(range(1, (people or protocol.participants) + 1))
+    return Tables(protocol, pd.DataFrame(trials), pd.DataFrame(answers), enrolled=enrolled)
 
 
 def _trial(

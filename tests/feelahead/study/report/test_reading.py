@@ -1,10 +1,13 @@
-"""Tables of a study from recordings of which none can be read."""
+"""Tables from a folder of a study."""
 
 from pathlib import Path
 
+from feelahead.study.events import Begun, Enrolled, Withdrew
 from feelahead.study.folder import TRIALS, Study
 from feelahead.study.report.reading import read_tables
-from tests.feelahead.study.driving import do_all
+from feelahead.study.report.summaries import flow
+from tests.feelahead.study.driving import do_all, do_step
+from tests.helpers.repository import ROOT
 
 TEXT = """
 name = "Small"
@@ -34,3 +37,17 @@ def test_a_recording_that_cannot_be_read_is_excluded_with_its_reason(tmp_path: P
     assert trials.excluded.iloc[1].startswith("p01-t002.mcap: ")
     assert (tables.trials.excluded[tables.trials.practice] == "practice").all()
     assert len(tables.analysed) == 0
+
+
+def test_who_was_enrolled_is_counted_also_without_a_trial(tmp_path: Path) -> None:
+    with Study(tmp_path / "study", ROOT / "examples" / "study.toml") as study:
+        for number in (1, 2, 4):
+            study.add(Enrolled(participant=number, at_s=0.0))
+        study.add(Withdrew(participant=2, at_s=1.0))
+        do_step(study, 1)
+        study.add(Begun(participant=1, at_s=2.0, trial=1, attempt=1, practice=True))
+    tables = read_tables(tmp_path / "study")
+    assert (tables.enrolled, tables.withdrew) == ((1, 2, 4), (2,))
+    counts = dict(flow(tables, ()))
+    assert counts["participants who were enrolled"] == 3
+    assert counts["of these without a trial in the data"] == 2

@@ -20,14 +20,14 @@ from tests.feelahead.study.made_up import PROTOCOL, made_up
 
 @pytest.fixture(scope="module")
 def tables() -> Tables:
-    """A study of four with one fault, one exclusion, and a fifth who withdrew; their data are removed."""
+    """A study of four with one fault, one exclusion, a fifth who withdrew, and a sixth who began no trial."""
     made = made_up(people=4)
     trials = made.trials
     again = trials.loc[[8]].assign(attempt=2)
     trials.loc[8, "status"] = "fault"
     trials.loc[20, "excluded"] = "a <phone> rang"
     named = replace(PROTOCOL, name="Study of <b>four</b>")
-    return Tables(named, pd.concat([trials, again], ignore_index=True), made.answers, withdrew=(5,))
+    return Tables(named, pd.concat([trials, again], ignore_index=True), made.answers, (5,), (*range(1, 7),))
 
 
 def test_the_page_has_everything_inside_and_the_same_bytes_again(tables: Tables, tmp_path: Path) -> None:
@@ -50,7 +50,8 @@ def test_the_page_has_everything_inside_and_the_same_bytes_again(tables: Tables,
 
 def test_each_person_and_trial_is_accounted_for(tables: Tables) -> None:
     counts = dict(summaries.flow(tables, compare(tables)))
-    assert counts["participants who began"] == 5
+    assert counts["participants who were enrolled"] == 6
+    assert counts["of these without a trial in the data"] == 2
     assert counts["participants who withdrew (data: remove)"] == 1
     assert counts["other trials that were begun"] == 4 * 72 + 1
     assert (counts["of these fault"], counts["complete, and excluded"]) == (1, 1)
