@@ -115,7 +115,7 @@ class Session:
     def view(self, now_s: float) -> Mapping[str, Mapping[str, Any]]:
         """Return what the page of the participant and that of the experimenter show; neither tells the condition."""
         progress, run = self._study.journal.progress(self._participant), self._run
-        shown = {**self._shown(), "running": run is not None}
+        shown = {**self._shown(), "participant": self._participant, "running": run is not None}
         if left_s := self._rest_left_s(now_s):
             shown["rest_left_s"] = left_s
         faults = [one for one in progress.attempts if one.status == "fault"]
@@ -123,7 +123,6 @@ class Session:
             "participant": shown,
             "experimenter": shown
             | {
-                "participant": self._participant,
                 "trials_done": len(progress.complete),
                 "faults": [one.reason for one in faults],
                 "practised": progress.practised(self._study.protocol.practice),

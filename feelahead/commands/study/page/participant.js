@@ -18,8 +18,9 @@ const say = connect((newest) => {
     leaves = true;
     location.replace(state.console);
   }
-  const { step, number, attempt, block, phase, ready } = state;
-  const shown = JSON.stringify([step, number, attempt, block, phase, ready]);
+  const { participant, step, number, attempt, block, phase, ready } = state;
+  forget();
+  const shown = JSON.stringify([participant, step, number, attempt, block, phase, ready]);
   if (shown !== key) {
     key = shown;
     byId("card").replaceChildren(...card().filter(Boolean));
@@ -70,9 +71,16 @@ function showRest() {
   byId("go_on").disabled = left > 0;
 }
 
-// Answers are kept by this tab until they are sent, so that a reload loses none.
+// Answers are kept by this tab until their step has changed, so that neither a reload nor a full disk loses any.
+const kept = () => `answers ${state.study} ${state.participant} `;
+
+function forget() {
+  if (state.participant === undefined || ["questions", "pause"].includes(state.step)) return;
+  for (const name of Object.keys(sessionStorage)) if (name.startsWith(kept())) sessionStorage.removeItem(name);
+}
+
 function questions() {
-  const place = `answers ${state.study} ${state.block}`;
+  const place = `${kept()}${state.block}`;
   const answers = JSON.parse(sessionStorage.getItem(place) ?? "{}");
   const missing = make("p", { id: "missing", role: "alert" });
   const fields = state.asked.map((question, k) => field(question, k, answers, () => sessionStorage.setItem(place, JSON.stringify(answers))));
@@ -84,10 +92,7 @@ function questions() {
     const count = open.filter(Boolean).length;
     missing.textContent = count ? `${count} ${count === 1 ? "question is" : "questions are"} still open.` : "";
     if (count) fields[open.indexOf(true)].querySelector("input").focus();
-    else {
-      say("answered", { block: state.block, values: answers });
-      sessionStorage.removeItem(place);
-    }
+    else say("answered", { block: state.block, values: answers });
   });
   return [title("A few questions about the last trials"), words("There are no right or wrong answers."), form];
 }
