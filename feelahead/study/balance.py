@@ -1,10 +1,11 @@
 """How balanced the plans of a study's participants are, and how long each takes at most."""
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Container, Iterable, Mapping
 from itertools import pairwise, product
 from typing import Final
 
+from feelahead.study.events import MOST_NUMBER
 from feelahead.study.progress import Progress
 from feelahead.study.protocol import Protocol
 from feelahead.study.schedule import schedule, williams
@@ -15,18 +16,20 @@ ANSWER_S: Final = 10.0
 
 def places(protocol: Protocol) -> Mapping[tuple[str, int], int]:
     """Return how many of the planned participants meet each condition at each place, from 1."""
-    return Counter((name, place) for order in _orders(protocol) for place, name in enumerate(order, 1))
+    planned = _orders(protocol, _planned(protocol))
+    return Counter((name, place) for order in planned for place, name in enumerate(order, 1))
 
 
 def follows(protocol: Protocol) -> Mapping[tuple[str, str], int]:
     """Return how many of the planned participants meet the second condition directly after the first."""
-    return Counter(pair for order in _orders(protocol) for pair in pairwise(order))
+    planned = _orders(protocol, _planned(protocol))
+    return Counter(pair for order in planned for pair in pairwise(order))
 
 
 def delay_places(protocol: Protocol) -> tuple[int, int]:
     """Return how often, at least and at most, a delay stands at each place under each condition."""
     counts: Counter[tuple[str, int, float]] = Counter()
-    for number, condition in product(range(1, protocol.participants + 1), protocol.conditions):
+    for number, condition in product(_planned(protocol), protocol.conditions):
         delays = dict.fromkeys(one.delay_ms for one in schedule(protocol, number) if one.condition == condition)
         counts.update((condition, place, delay) for place, delay in enumerate(delays))
     possible = len(protocol.conditions) * len(protocol.delays_ms) ** 2
@@ -36,6 +39,22 @@ def delay_places(protocol: Protocol) -> tuple[int, int]:
 def whole_square(protocol: Protocol) -> int:
     """Return the least number of participants over which the order of conditions is balanced."""
     return len(williams(len(protocol.conditions)))
+
+
+def replacement(protocol: Protocol, withdrew: int, taken: Container[int]) -> int | None:
+    """Return the number of who replaces one who withdrew: above all that are planned, and with the same order.
+
+    That is the first number that is not `taken`, and is larger by a multiple of `whole_square`. None if none is left.
+    """
+    square = whole_square(protocol)
+    later = range(withdrew + square, MOST_NUMBER + 1, square)
+    return next((number for number in later if number > protocol.participants and number not in taken), None)
+
+
+def orders(protocol: Protocol, participants: Iterable[int]) -> Mapping[tuple[str, ...], int]:
+    """Return how many of these participants have each order of conditions, also of those that none has."""
+    possible = dict.fromkeys(_orders(protocol, range(1, whole_square(protocol) + 1)), 0)
+    return possible | Counter(_orders(protocol, participants))
 
 
 def most_minutes(protocol: Protocol) -> Mapping[str, float]:
@@ -71,6 +90,9 @@ def left_minutes(protocol: Protocol, progress: Progress, participant: int) -> fl
     return (left_s + len(protocol.questions) * (len(protocol.conditions) - len(progress.answers)) * ANSWER_S) / 60.0
 
 
-def _orders(protocol: Protocol) -> list[list[str]]:
-    numbers = range(1, protocol.participants + 1)
-    return [list(dict.fromkeys(one.condition for one in schedule(protocol, number))) for number in numbers]
+def _orders(protocol: Protocol, numbers: Iterable[int]) -> list[tuple[str, ...]]:
+    return [tuple(dict.fromkeys(one.condition for one in schedule(protocol, number))) for number in numbers]
+
+
+def _planned(protocol: Protocol) -> range:
+    return range(1, protocol.participants + 1)

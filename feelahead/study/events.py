@@ -1,13 +1,14 @@
 """Events of a study, one a line of its journal; everything else follows from them."""
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Final, Literal
 
 import msgspec
 from msgspec import Meta
 
 from common.limits import Finite, check_limits
 
-Number = Annotated[int, Meta(ge=1, le=999)]
+MOST_NUMBER: Final = 999
+Number = Annotated[int, Meta(ge=1, le=MOST_NUMBER)]
 EndedBy = Literal["placed", "limit", "experimenter"]
 
 

@@ -100,7 +100,7 @@ class Protocol(Limited):
 
     name: Annotated[str, Meta(min_length=1, max_length=80)]
     participants: _Count
-    """Planned number of participants; a higher number replaces one who withdrew"""
+    """Planned number of participants; above it are those who replace one who withdrew"""
     seed: Annotated[int, Meta(ge=0, lt=2**32)]
     controller: ControllerName
     conditions: dict[str, Condition] = field(hash=False)

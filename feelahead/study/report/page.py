@@ -5,6 +5,7 @@ from html import escape
 from importlib.metadata import version
 from typing import Any, Final
 
+from feelahead.study.balance import orders
 from feelahead.study.protocol import Contrast
 from feelahead.study.report import pictures, summaries
 from feelahead.study.report.contrasts import Compared, effects_by
@@ -178,9 +179,16 @@ def _order(tables: Tables) -> str:
     if blocks.empty:
         return ""
     rows = [(row[0], *map(str, row[1:])) for row in places.itertuples()]
+    had = orders(tables.protocol, tables.analysed.participant.unique()).values()
+    unequal = (
+        f"<p>The orders of conditions are unequal: of those who count, {min(had)} to {max(had)} had each order.</p>"
+        if min(had) < max(had)
+        else ""
+    )
     return (
         "<h2>Order, practice and fatigue</h2>"
         + _picture(pictures.blocks(blocks), "All conditions together, by block, with 95 % intervals.")
+        + unequal
         + "<p>Participants who had each condition in each block, as it was run:</p>"
         + _table(("condition", *(f"block {number}" for number in places.columns)), rows)
     )

@@ -1,8 +1,9 @@
 """Text of a preregistration, in Markdown, from a protocol and its plan."""
 
+from feelahead.study.balance import whole_square
 from feelahead.study.protocol import Protocol
 from feelahead.study.report.outcomes import outcome_of
-from feelahead.study.report.power import ASKED, Plan, balanced_sizes
+from feelahead.study.report.power import ASKED, Plan
 from feelahead.study.report.words import models, named, settings_of
 
 
@@ -64,10 +65,13 @@ def _design(protocol: Protocol) -> list[str]:
 
 
 def _number(protocol: Protocol, planned: Plan | None) -> list[str]:
-    lines = [f"{protocol.participants} participants; whoever withdraws is replaced by a higher number."]
-    sizes = balanced_sizes(protocol)
-    if sizes and protocol.participants % sizes[0]:
-        lines.append(f"The order of conditions is balanced for multiples of {sizes[0]}, which this number is not.")
+    square = whole_square(protocol)
+    lines = [
+        f"{protocol.participants} participants. Whoever withdraws is replaced: the new number is above"
+        f" {protocol.participants}, and larger than theirs by a multiple of {square}. So the order is the same."
+    ]
+    if protocol.participants % square:
+        lines.append(f"The order of conditions is balanced for multiples of {square}, which this number is not.")
     if planned is None:
         return [*lines, "Power was not estimated."]
     lines += [

@@ -95,6 +95,7 @@ def test_the_preregistration_says_hypotheses_number_and_analysis(pool: Tables) -
         "counts with the limit of 45 s",
     ):
         assert words in text
+    assert "the new number is above 12, and larger than theirs by a multiple of 4." in text
     unbalanced = preregistration(replace(PROTOCOL, participants=13))
     assert "balanced for multiples of 4, which this number is not" in unbalanced
     assert "Power was not estimated." in unbalanced

@@ -14,6 +14,7 @@ from feelahead.study.folder import MADE_ANEW
 from feelahead.study.report import summaries
 from feelahead.study.report.contrasts import compare
 from feelahead.study.report.outcomes import Tables
+from feelahead.study.report.page import page
 from feelahead.study.report.writing import write_report
 from tests.feelahead.study.made_up import PROTOCOL, made_up
 
@@ -32,9 +33,9 @@ def tables() -> Tables:
 
 def test_the_page_has_everything_inside_and_the_same_bytes_again(tables: Tables, tmp_path: Path) -> None:
     (tmp_path / "again").mkdir()
-    page = write_report(replace(tables, simulated=True), tmp_path)
-    text = page.read_text(encoding="utf-8")
-    assert write_report(replace(tables, simulated=True), tmp_path / "again").read_bytes() == page.read_bytes()
+    written = write_report(replace(tables, simulated=True), tmp_path)
+    text = written.read_text(encoding="utf-8")
+    assert write_report(replace(tables, simulated=True), tmp_path / "again").read_bytes() == written.read_bytes()
     assert {path.name for path in tmp_path.glob("*.*")} == {*MADE_ANEW}
     assert set(re.findall(r'(?:src|href)="([^,"]*)', text)) == {"data:image/svg+xml;base64"}
     assert text.count("<img") == 4
@@ -43,12 +44,16 @@ def test_the_page_has_everything_inside_and_the_same_bytes_again(tables: Tables,
     assert "a &lt;phone&gt; rang" in text
     assert "Simulated participants" in text
     assert "Simulated participants" not in write_report(tables, tmp_path).read_text(encoding="utf-8")
+    assert "The orders of conditions are unequal" not in text
     contrasts = pd.read_parquet(tmp_path / "contrasts.parquet")
     assert list(contrasts.p_exact) == [one.p_exact for one in compare(tables)]
     assert len(pd.read_parquet(tmp_path / "trials.parquet")) == len(tables.trials)
 
 
 def test_each_person_and_trial_is_accounted_for(tables: Tables) -> None:
+    trials = tables.trials[tables.trials.participant != 2]
+    said = page(replace(tables, trials=trials), ())
+    assert "The orders of conditions are unequal: of those who count, 0 to 1 had each order." in said
     counts = dict(summaries.flow(tables, compare(tables)))
     assert counts["participants who were enrolled"] == 6
     assert counts["of these without a trial in the data"] == 2

@@ -1,4 +1,4 @@
-"""Tables from a folder of a study."""
+"""Flow of participants from a folder of a study."""
 
 from pathlib import Path
 
