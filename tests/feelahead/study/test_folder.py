@@ -315,7 +315,11 @@ def test_a_folder_of_something_else_is_refused(file: Path, tmp_path: Path) -> No
 
 
 @pytest.mark.parametrize("simulated", [False, True])
-def test_people_and_simulated_persons_never_share_a_folder(file: Path, tmp_path: Path, *, simulated: bool) -> None:
+def test_people_and_simulated_persons_never_share_a_folder(
+    file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, *, simulated: bool
+) -> None:
+    for name in ("feelahead.study.trials.simulated.processes", "feelahead.commands.study.people.PageServer"):
+        monkeypatch.setattr(name, lambda *_: pytest.fail("it has begun"))
     with Study(tmp_path / "study", file) as study:
         study.add(Enrolled(participant=1, at_s=0.0, simulated=simulated))
         runs: tuple[Callable[[], None], ...] = (lambda: run_people(study, None), lambda: run_simulated(study, 2, 1))
