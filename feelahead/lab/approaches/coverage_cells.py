@@ -52,7 +52,7 @@ def depth_cells(*, quick: bool) -> Cells:
 
     Each scene is also judged with the objects themselves perceived, for comparison.
     """
-    scenes = ("wall", "ball", "rod_5mm", "mug", "slot", "shelf_edge") if quick else _BY_DEPTH
+    scenes = ("wall", "ball", "post", "rod_5mm", "mug", "slot", "shelf_edge") if quick else _BY_DEPTH
     for name in scenes:
         yield "bell", "50 ms", Placement(name)
         for eyes in _EYES:
