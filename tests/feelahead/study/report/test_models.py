@@ -1,5 +1,6 @@
 """Models against closed forms: in balanced data these are known."""
 
+import math
 from typing import Any
 
 import numpy as np
@@ -99,7 +100,7 @@ def test_what_cannot_be_fitted_is_none_and_says_why() -> None:
 @pytest.mark.parametrize("kind", list(Kind))
 def test_where_all_participants_differ_alike_there_is_no_interval_and_p_is_exact(kind: Kind) -> None:
     values = np.ones((PEOPLE, 2, 1, 6))
-    values[:, 1, 0, :3] = 1.0 / np.e if kind is Kind.FACTOR else 0.0
+    values[:, 1, 0, :3] = 1.0 / math.e if kind is Kind.FACTOR else 0.0
     values[::2] = values[::2, :, :, ::-1]  # not the same trials
     found = fit(balanced(values), kind, "a")
     assert found.estimate == pytest.approx(np.exp(0.5) if kind is Kind.FACTOR else 0.5)
