@@ -268,7 +268,7 @@ def _check_data(folder: Path) -> None:
         (one.participant, one.trial, one.attempt, one.condition, one.status, one.excluded) for one in records
     ]
     assert rows == [
-        (1, 1, 1, "off", "complete", None),
+        (1, 1, 1, "off", "complete", "ended by the experimenter"),
         (1, 2, 1, "felt", "fault", "the robot side was lost"),
         (1, 2, 2, "felt", "complete", None),
         (2, 1, 1, "felt", "fault", "interrupted"),
