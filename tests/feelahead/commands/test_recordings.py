@@ -125,7 +125,7 @@ def test_a_real_run_is_computed_anew_to_the_same_bits(tmp_path: Path) -> None:
     recording = open_recording(path)
     assert recording.whole
     assert set(recording.headers) == {"robot", "operator"}
-    assert fitting_topics(path) == {*TYPES, FACTS_TOPIC} - {"/episode"}
+    assert fitting_topics(path) == {*TYPES, FACTS_TOPIC} - {"/episode", "/unseen"}
     robot, operator = replay_robot(recording), replay_operator(recording)
     assert robot.made == robot.equal == told["messages"]["stiffness_sent"] > 0
     assert operator.made == operator.equal > 0
