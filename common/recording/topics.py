@@ -84,7 +84,7 @@ class Truth(Moment, frozen=True):
     tool_m: Vector3
     """True position of the tool, in the world frame"""
     obstacle_mm: float | None
-    """Distance from the gripper to the nearest obstacle, negative inside it; None beyond 1 m"""
+    """Distance in the world frame from the gripper to the nearest obstacle, negative inside it; None beyond 1 m"""
     held: str | None
     """Object that the gripper holds"""
     hits: int

@@ -102,7 +102,7 @@ def test_a_run_with_episodes_and_the_scene_put_back_is_made_again(tmp_path: Path
     heard = [one for one in recorded_entries(recording, "robot", []) if one.kind == Kind.EPISODE]
     assert [msgspec.json.decode(one.content) for one in heard] == [one["mark"] for one in shown]
     statuses = {"/robot/status", "/operator/status"}
-    assert fitting_topics(path) == {"/stiffness", "/command", "/ages", "/episode"} | statuses
+    assert fitting_topics(path) == {"/stiffness", "/command", "/ages", "/episode", "/truth"} | statuses
     arm = read_tables(recording).table("arm")
     positions = np.stack([arm.numbers(f"position_rad.{joint}") for joint in range(6)], axis=1)
     away = np.abs(positions - positions[0]).max(axis=1)
