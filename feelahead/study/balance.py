@@ -51,6 +51,25 @@ def replacement(protocol: Protocol, withdrew: int, taken: Container[int]) -> int
     return next((number for number in later if number > protocol.participants and number not in taken), None)
 
 
+def next_number(protocol: Protocol, known: Container[int], withdrew: Iterable[int]) -> int:
+    """Return the number of the next participant: planned and new, or in the place of one who withdrew.
+
+    known: numbers that are taken. withdrew: those of who withdrew, in order.
+    """
+    square = whole_square(protocol)
+    beyond = [number for number in range(protocol.participants + 1, MOST_NUMBER + 1) if number in known]
+    for number in range(1, protocol.participants + 1):
+        if number not in known:
+            return number
+    for gone in withdrew:
+        same = next((number for number in beyond if number > gone and (number - gone) % square == 0), None)
+        if same is not None:
+            beyond.remove(same)
+        elif (new := replacement(protocol, gone, known)) is not None:
+            return new
+    return next(number for number in range(protocol.participants + 1, MOST_NUMBER + 2) if number not in known)
+
+
 def orders(protocol: Protocol, participants: Iterable[int]) -> Mapping[tuple[str, ...], int]:
     """Return how many of these participants have each order of conditions, also of those that none has."""
     possible = dict.fromkeys(_orders(protocol, range(1, whole_square(protocol) + 1)), 0)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any, Final, Literal
 
 from common.errors import FeelaheadError
-from feelahead.study.balance import left_minutes
+from feelahead.study.balance import left_minutes, next_number
 from feelahead.study.events import EndedBy
 from feelahead.study.folder import Study
 from feelahead.study.progress import NEVER_ARMED
@@ -279,7 +279,7 @@ class Room:
         self._ready = False
 
     def _list(self) -> tuple[list[dict[str, Any]], int]:
-        """Return a row for each participant, and the number of the next one: the first that has not begun."""
+        """Return a row for each participant, and the number of the next one."""
         rows = []
         for number in self._study.journal.participants:
             progress = self._study.journal.progress(number)
@@ -287,5 +287,5 @@ class Room:
             step = public(self._study.next_step(number))["step"]
             done, of = len(progress.complete), len(schedule(self._study.protocol, number))
             rows.append({"number": number, "step": step, "trials_done": done, "of": of, "faults": faults})
-        known = {row["number"] for row in rows}
-        return rows, next(number for number in range(1, 1001) if number not in known)
+        gone = [row["number"] for row in rows if row["step"] == "withdrawn"]
+        return rows, next_number(self._study.protocol, {row["number"] for row in rows}, gone)
