@@ -25,6 +25,7 @@ MARGIN: Final = "margin"
 """Law that needs `margin_m`"""
 OUTCOMES: Final = (
     *("completed", "time_s", "contacts", "hit", "fastest_mm_s", "impulse_n_s", "path_m", "least_mm", "exposure_s"),
+    "enlargement_mm",
 )
 """Outcomes of a trial, as the table's columns are named"""
 RAW_TLX: Final = "tlx"

@@ -50,6 +50,7 @@ OUTCOMES: Final = {
         Outcome("path_m", "path of the gripper", Kind.FACTOR, "m"),
         Outcome("exposure_s", "time nearer than 5 mm", Kind.AMOUNT, "s"),
         Outcome("least_mm", "least distance", Kind.PLAIN, "mm"),
+        Outcome("enlargement_mm", "enlargement while moving", Kind.PLAIN, "mm"),
         Outcome(
             *("fastest_mm_s", "fastest contact", Kind.PLAIN, "mm/s"),
             caution="only pairs of trials that both had a contact, which the conditions themselves choose",

@@ -11,7 +11,7 @@ from common.arrays import FloatArray
 from common.errors import ConfigurationError
 from feelahead.study.protocol import Contrast, Protocol
 from feelahead.study.report.contrasts import pairs_of
-from feelahead.study.report.outcomes import Kind, Tables, measured, outcome_of
+from feelahead.study.report.outcomes import OUTCOMES, Kind, Tables, measured, outcome_of
 from feelahead.study.report.participants import alike_p, are_alike
 
 LEVEL: Final = 0.05
@@ -47,6 +47,8 @@ class Plan:
     rows: tuple[Power, ...]
     untold: tuple[Contrast, ...] = ()
     """Contrasts of outcomes that the simulated participants lack, such as answers"""
+    enlargements_mm: tuple[tuple[str, float], ...] = ()
+    """Conditions, each with the mean enlargement while the tool moved: what a fair `margin_m` equals"""
 
     def smallest(self, contrast: Contrast, power: float, effect: float = 1.0) -> int | None:
         """Return the smallest number from which on `power` is within reach; None if none of those tried is enough.
@@ -121,7 +123,8 @@ def plan(
                 interval = binomtest(count, resamples).proportion_ci(0.95, method="exact")
                 found = (count / resamples, float(interval.low), float(interval.high))
                 rows.append(Power(contrast, size, effect, *found))
-    return Plan(differences.shape[1], resamples, tuple(rows), untold)
+    means_mm = measured(tables, OUTCOMES["enlargement_mm"]).groupby("condition").value.mean()
+    return Plan(differences.shape[1], resamples, tuple(rows), untold, tuple(means_mm.items()))
 
 
 def _differences(tables: Tables) -> tuple[tuple[Contrast, ...], FloatArray]:

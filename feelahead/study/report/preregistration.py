@@ -11,7 +11,7 @@ def preregistration(protocol: Protocol, planned: Plan | None = None) -> str:
     """Return hypotheses, design, number of participants, outcomes, exclusions and analysis, as plain sentences."""
     sections = (
         ("Hypotheses", _hypotheses(protocol)),
-        ("Design", _design(protocol)),
+        ("Design", _design(protocol, planned)),
         ("Number of participants", _number(protocol, planned)),
         ("Outcomes", _outcomes(protocol)),
         ("Exclusions", _exclusions(protocol)),
@@ -37,7 +37,7 @@ def _hypotheses(protocol: Protocol) -> list[str]:
     return lines or ["None: the study describes."]
 
 
-def _design(protocol: Protocol) -> list[str]:
+def _design(protocol: Protocol, planned: Plan | None) -> list[str]:
     cells = len(protocol.delays_ms) * len(protocol.scenes) * protocol.trials
     conditions = [f"- {name}: {settings_of(one)}" for name, one in protocol.conditions.items()]
     practice = protocol.practice
@@ -48,6 +48,7 @@ def _design(protocol: Protocol) -> list[str]:
         f"{protocol.seed}. Neither participant nor experimenter is told the condition of a trial.",
         "",
         *conditions,
+        *([] if planned is None else _enlargements(planned)),
         "",
         f"Delays, one way: {', '.join(f'{delay:g} ms' for delay in protocol.delays_ms)}. "
         f"Scenes: {', '.join(protocol.scenes)}. Repetitions of each cell: {protocol.trials}.",
@@ -62,6 +63,11 @@ def _design(protocol: Protocol) -> list[str]:
     if protocol.rest is not None:
         lines.append(f"A rest of {protocol.rest.seconds:g} s after every {protocol.rest.trials} trials.")
     return lines
+
+
+def _enlargements(planned: Plan) -> list[str]:
+    means = ", ".join(f"{name} {mean_mm:.1f} mm" for name, mean_mm in planned.enlargements_mm)
+    return ["", f"Mean enlargement while a simulated participant's tool moved: {means}."] if means else []
 
 
 def _number(protocol: Protocol, planned: Plan | None) -> list[str]:

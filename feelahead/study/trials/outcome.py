@@ -1,19 +1,22 @@
 """Outcome of a trial, from its recording alone."""
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import msgspec
 import numpy as np
 
+from common.arrays import FloatArray
 from common.recording.reading import open_recording
-from common.recording.topics import Truth
+from common.recording.topics import TYPES, Truth
 from feelahead.study.protocol import STANDS_S
+from robot_side.outcome.figures import MOVING_M_S
 
-_TOPIC: Final = "/truth"
+_TRUTH: Final = "/truth"
+_STATUS: Final = "/robot/status"
 NEAR_MM: Final = 5.0
 """Distance to an obstacle below which a gripper is exposed"""
 
@@ -39,6 +42,8 @@ class Outcome:
     """Least distance of the gripper from an obstacle, negative inside it; None beyond 1 m"""
     exposure_s: float
     """Time for which it was less than NEAR_MM"""
+    enlargement_mm: float | None
+    """Mean enlargement of the gripper while the tool moved, which a fair `margin_m` equals; None if it was not known"""
 
 
 def outcome_of(recording: Path, limit_s: float) -> Outcome | None:
@@ -48,13 +53,20 @@ def outcome_of(recording: Path, limit_s: float) -> Outcome | None:
     ConfigurationError for a file that is no recording, or has no truth, as with an arm that is not simulated.
     """
     opened = open_recording(recording)
-    opened.require((_TOPIC,))
-    decode = msgspec.json.Decoder(Truth).decode
-    return outcome([decode(message.content) for message in opened.messages((_TOPIC,))], limit_s)
+    opened.require((_TRUTH,))
+    decoders = {_TRUTH: msgspec.json.Decoder(Truth).decode, _STATUS: msgspec.json.Decoder(TYPES[_STATUS]).decode}
+    found: dict[str, list[Any]] = {topic: [] for topic in decoders}
+    for message in opened.messages(tuple(topic for topic in decoders if topic in opened.topics)):
+        found[message.topic].append(decoders[message.topic](message.content))
+    known = [(one.time_s, one.enlargement_mm) for one in found[_STATUS] if one.enlargement_mm is not None]
+    return outcome(found[_TRUTH], limit_s, known)
 
 
-def outcome(truths: list[Truth], limit_s: float) -> Outcome | None:
-    """Return the outcome of a trial with these truths, in order of time; None if the arm was never armed."""
+def outcome(truths: list[Truth], limit_s: float, enlargements: Sequence[tuple[float, float]] = ()) -> Outcome | None:
+    """Return the outcome of a trial with these truths, in order of time; None if the arm was never armed.
+
+    enlargements: times in seconds, each with the enlargement in mm that the law had then.
+    """
     first = next((place for place, truth in enumerate(truths) if truth.armed), None)
     if first is None:
         return None
@@ -77,7 +89,17 @@ def outcome(truths: list[Truth], limit_s: float) -> Outcome | None:
         path_m=float(np.linalg.norm(np.diff(tool_m, axis=0), axis=1).sum()),
         least_mm=None if np.isinf(gaps_mm.min()) else float(gaps_mm.min()),
         exposure_s=float(np.diff(times_s)[gaps_mm[:-1] < NEAR_MM].sum()),
+        enlargement_mm=_mean_moving(enlargements, times_s, tool_m),
     )
+
+
+def _mean_moving(enlargements: Sequence[tuple[float, float]], times_s: FloatArray, tool_m: FloatArray) -> float | None:
+    """Return the mean of the enlargements between the first time and the last, while the tool moved; None without."""
+    those = np.array([one for one in enlargements if times_s[0] < one[0] <= times_s[-1]]).reshape(-1, 2)
+    at_s = np.concatenate([times_s[:1], those[:, 0]])
+    places_m = np.column_stack([np.interp(at_s, times_s, along_m) for along_m in tool_m.T])
+    moved = np.linalg.norm(np.diff(places_m, axis=0), axis=1) > MOVING_M_S * np.diff(at_s)
+    return float(those[moved, 1].mean()) if moved.any() else None
 
 
 def _stood_s(truths: Iterable[Truth]) -> float | None:

@@ -88,4 +88,5 @@ def _trial(
         "path_m": float(0.5 * np.exp(generator.normal(0.0, 0.1))),
         "least_mm": 0.0 if hit else float(generator.gamma(3.0, 4.0)),
         **{"exposure_s": float(generator.gamma(1.0, 0.2)), "recording": f"trials/t{planned.number:03}.mcap"},
+        "enlargement_mm": 30.0 + 0.1 * planned.delay_ms,
     }

@@ -7,6 +7,7 @@ import sys
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Final
 
 import numpy as np
@@ -19,6 +20,7 @@ from feelahead.study.protocol import Contrast
 from feelahead.study.report.contrasts import Compared, compare
 from feelahead.study.report.outcomes import Tables
 from feelahead.study.report.power import LEVEL, plan
+from feelahead.study.report.reading import read_tables
 from feelahead.study.report.words import named
 from tests.feelahead.study.made_up import NONE, PROTOCOL, Effects, made_up
 
@@ -51,7 +53,9 @@ class TypeOneError:
     participants: int = 12
     """Participants of each study"""
     pool: int = 100
-    """Simulated participants from whom they are drawn"""
+    """Made-up participants from whom they are drawn"""
+    folder: Path | None = None
+    """Folder of a study with simulated persons, from whom they are drawn instead"""
     seed: int = 0
 
 
@@ -70,16 +74,23 @@ class Errors:
 
 def resampled(pool: Tables, people: int, generator: np.random.Generator, *, without_effect: bool) -> Tables:
     """Return a study of participants drawn from the pool; without effect, each one's conditions change their names."""
-    by_person = dict(iter(pool.trials.groupby("participant")))
     conditions = list(pool.protocol.conditions)
-    parts = []
-    for number, person in enumerate(generator.choice(sorted(by_person), people), start=1):
-        part = by_person[person].assign(participant=number)
-        if without_effect:
-            names = dict(zip(conditions, generator.permutation(conditions).tolist(), strict=True))
-            part["condition"] = part.condition.map(names)
-        parts.append(part)
-    return Tables(pool.protocol, pd.concat(parts, ignore_index=True), pool.answers)
+    people_drawn = generator.choice(sorted({*pool.trials.participant}), people)
+    names = [
+        dict(zip(conditions, generator.permutation(conditions).tolist() if without_effect else conditions, strict=True))
+        for _ in people_drawn
+    ]
+
+    def drawn(frame: pd.DataFrame) -> pd.DataFrame:
+        by_person = dict(iter(frame.groupby("participant")))
+        parts = [
+            by_person.get(person, frame.iloc[:0]).assign(participant=number)
+            for number, person in enumerate(people_drawn, start=1)
+        ]
+        changed = [part.assign(condition=part.condition.map(own)) for part, own in zip(parts, names, strict=True)]
+        return pd.concat(changed, ignore_index=True)
+
+    return Tables(pool.protocol, drawn(pool.trials), drawn(pool.answers))
 
 
 def compared(
@@ -119,8 +130,9 @@ def _share(count: int, of: int) -> str:
 
 def main(arguments: Sequence[str]) -> int:
     asked = parse_settings(TypeOneError, PROGRAM, arguments)
+    drawn_from = None if asked.folder is None else read_tables(asked.folder)
     if asked.resamples:
-        pool = made_up(MODERATE if asked.from_effects else NONE, ASKED, asked.pool, seed=asked.seed + 1)
+        pool = drawn_from or made_up(MODERATE if asked.from_effects else NONE, ASKED, asked.pool, seed=asked.seed + 1)
         studies = [*compared(pool, asked.participants, asked.resamples, asked.seed, without_effect=True)]
         sys.stdout.write(f"without an effect, {asked.participants} participants\n")
         for one in errors(studies):
@@ -131,11 +143,13 @@ def main(arguments: Sequence[str]) -> int:
         _tell_models(studies)
     if not asked.studies:
         return 0
-    pool = made_up(MODERATE, ASKED, asked.pool, seed=asked.seed + 2)
+    pool = drawn_from or made_up(MODERATE, ASKED, asked.pool, seed=asked.seed + 2)
     promised = plan(pool, (asked.participants,), effects=(1.0,), resamples=10_000)
     studies = [*compared(pool, asked.participants, asked.studies, asked.seed, without_effect=False)]
     sys.stdout.write(f"power with {asked.participants} participants, after Holm's correction\n")
-    for row, one in zip(promised.rows, errors(studies), strict=True):
+    found = {one.contrast: one for one in errors(studies)}
+    for row in promised.rows:
+        one = found[row.contrast]
         sys.stdout.write(
             f"  {named(row.contrast)}: promised {100 * row.power:.1f} %, found {_share(one.corrected, len(studies))}\n"
         )

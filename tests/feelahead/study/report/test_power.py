@@ -89,6 +89,7 @@ def test_the_preregistration_says_hypotheses_number_and_analysis(pool: Tables) -
         f"Protocol {PROTOCOL.hash}.",
         "1. There is a difference in trials with a hit between off and swept (two-sided; family “all”).",
         "- margin: law margin of 40 mm",
+        "participant's tool moved: assist 40.0 mm, margin 40.0 mm, off 40.0 mm, swept 40.0 mm.",
         "So 18 trials a block, 72 a participant, of at most 45 s.",
         "50 % of the simulated effect: 80 %",
         "A share of trials is compared by a logistic model",

@@ -72,3 +72,16 @@ def test_a_target_that_stands_for_a_moment_has_not_been_placed_yet() -> None:
         found = outcome(truths(9.0, placed=placed), LIMIT_S)
         assert found is not None
         assert (found.completed, found.time_s) == (False, None)
+
+
+def test_the_enlargement_counts_while_the_tool_moves_between_arming_and_the_end() -> None:
+    moving = truths(8.0, tool_m=lambda t: (0.1 * min(t, 2.0), 0.0, 0.0), placed=lambda t: t >= 4.0)
+    times_s = [0.05 * step for step in range(160)]
+    at = [(t, 900.0 if not 1.001 < t < 2.001 else 30.0 if t < 1.501 else 50.0) for t in times_s]
+    found = outcome(moving, LIMIT_S, at)
+    assert found is not None
+    assert found.enlargement_mm == pytest.approx(40.0)
+    for nothing in ([], [(0.5, 10.0)], [(4.5, 10.0)]):
+        found = outcome(moving, LIMIT_S, nothing)
+        assert found is not None
+        assert found.enlargement_mm is None
