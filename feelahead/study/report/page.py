@@ -231,7 +231,7 @@ def _limits(*, simulated: bool) -> str:
 
 def _value(outcome: Outcome, row: Any) -> str:
     factor = factor_of(outcome)
-    return f"{number(factor * row.value)} {interval(row.low, row.high, factor)}"
+    return f"{number(factor * row.value)} {interval(row.low, row.high, factor)}".removesuffix(f" {ABSENT}")
 
 
 def _table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:

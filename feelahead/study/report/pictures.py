@@ -122,7 +122,7 @@ def answered(frame: Any, protocol: Protocol) -> str:
 
 def _whiskers(axis: Any, x: Any, rows: Any, factor: float, colour: str) -> None:
     axis.vlines(x, factor * rows.low, factor * rows.high, color=colour)
-    axis.plot(x, factor * rows.value, marker="o", color=colour, linestyle="")
+    axis.plot(x, factor * rows.value, marker="o", color=colour, linestyle="", clip_on=False)
 
 
 def _cycled(count: int) -> list[str]:
