@@ -6,13 +6,13 @@ from typing import Final
 import numpy as np
 
 from common.arrays import FloatArray
+from robot_side.depth.own_body import beyond_m
 from robot_side.depth.perception import DepthPerception
 from robot_side.depth.picture import CameraPose, DepthErrors, DepthPicture, OwnBody, Pinhole
 from robot_side.depth.settings import MapSettings
 from robot_side.depth.slots import SlotChanges
 from robot_side.depth.support import supported
 from robot_side.depth.view import view_of
-from robot_side.drivers.mujoco.model_enums import GeomKind
 
 NEAR_M: Final = 0.03
 """Distance from the robot's solids within which a measured point counts as one on them"""
@@ -76,7 +76,7 @@ def figures_of(
     depths_m: FloatArray = (
         np.quantile(depth_m[measured].astype(float), (0.01, 0.5, 0.99)) if measured.any() else np.full(3, np.nan)
     )
-    beyond_m = beyond_solids(_points(kept, picture.pinhole, pose), body)
+    away_m = beyond_m(_points(kept, picture.pinhole, pose), body)
     return PictureFigures(
         age_s=now_s - picture.taken_s,
         width=depth_m.shape[1],
@@ -87,7 +87,7 @@ def figures_of(
         out_of_range=float((measured & ~valid).mean()),
         without_support=float((valid & (kept == 0.0)).mean()),
         depths_m=depths_m,
-        beyond_m=beyond_m[np.abs(beyond_m) <= NEAR_M],
+        beyond_m=away_m[np.abs(away_m) <= NEAR_M],
     )
 
 
@@ -100,32 +100,3 @@ def _points(depth_m: np.ndarray, pinhole: Pinhole, pose: CameraPose) -> FloatArr
     x, y = (columns + 0.5 - pinhole.cx) / pinhole.fx * z, (rows + 0.5 - pinhole.cy) / pinhole.fy * z
     points_m: FloatArray = pose.position_m + np.stack([x, y, z], axis=1) @ pose.rotation.T
     return points_m
-
-
-def beyond_solids(points_m: FloatArray, body: OwnBody) -> FloatArray:
-    """Return the signed distances (n,) of points (n, 3) from the surface of the union of the solids; inside below 0.
-
-    For ellipsoids, and inside several solids at once, the amount is at most the true one.
-    """
-    least_m = np.full(len(points_m), np.inf)
-    for kind, place_m, rotation, size in zip(body.kinds, body.positions_m, body.rotations, body.sizes_m, strict=True):
-        local = np.abs((points_m - place_m) @ rotation)
-        across = np.hypot(local[:, 0], local[:, 1])
-        match kind:
-            case GeomKind.BOX:
-                one_m = _beyond_box(local - size)
-            case GeomKind.CYLINDER:
-                one_m = _beyond_box(np.stack([across - size[0], local[:, 2] - size[1]], axis=1))
-            case GeomKind.CAPSULE:
-                one_m = np.hypot(across, np.maximum(local[:, 2] - size[1], 0.0)) - size[0]
-            case GeomKind.ELLIPSOID:
-                one_m = (np.linalg.norm(local / size, axis=1) - 1.0) * size.min()
-            case _:
-                one_m = np.linalg.norm(local, axis=1) - size[0]
-        np.minimum(least_m, one_m, out=least_m)
-    return least_m
-
-
-def _beyond_box(over_m: FloatArray) -> FloatArray:
-    beyond_m: FloatArray = np.linalg.norm(np.maximum(over_m, 0.0), axis=1) + np.minimum(over_m.max(axis=1), 0.0)
-    return beyond_m

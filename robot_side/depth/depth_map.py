@@ -15,7 +15,7 @@ from robot_side.depth.motion.carrying import Carried
 from robot_side.depth.motion.seer import UNSEEN_S, MotionSeer
 from robot_side.depth.motion.snapshots import snapshot
 from robot_side.depth.octree.planes import Planes
-from robot_side.depth.own_body import HELD_M, own_pixels, within
+from robot_side.depth.own_body import HELD_M, beyond_m, own_pixels
 from robot_side.depth.picture import CameraPose, DepthArray, DepthErrors, DepthPicture, LabelArray, OwnBody
 from robot_side.depth.pointing import patch_around
 from robot_side.depth.settings import MapSettings
@@ -108,7 +108,7 @@ class DepthMap:
         rows, table = self.surfels.shown, self.surfels.table
         if role is not None:
             rows = rows[table.roles[rows] == ROLES.index(role)]
-        self.surfels.forget(rows[within(table.points_m[rows], solids, near_m) > 0])
+        self.surfels.forget(rows[beyond_m(table.points_m[rows], solids) <= near_m])
 
     def _find_motion(
         self,

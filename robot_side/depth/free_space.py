@@ -6,7 +6,7 @@ import numpy as np
 
 from common.arrays import BoolArray, FloatArray, IntArray
 from robot_side.compiled.kernel import array_of, compiled, input_array, input_indices
-from robot_side.depth.own_body import within
+from robot_side.depth.own_body import beyond_m
 from robot_side.depth.picture import DepthArray, OwnBody
 from robot_side.depth.settings import MapSettings
 from robot_side.depth.view import LEAST, PICTURE, pixel_of, to_camera
@@ -66,7 +66,7 @@ class SeenSpace:
         count = round(2.0 * reach_m / _CELL_M) + 1
         cells = np.indices((count,) * 3).reshape(3, -1).T
         middles_m: FloatArray = self._place[:3] + (first + cells + 0.5) * _CELL_M
-        unseen = (self._has_seen(middles_m) == 0.0) & (within(middles_m, body, _CELL_M) == 0)
+        unseen = (self._has_seen(middles_m) == 0.0) & (beyond_m(middles_m, body) > _CELL_M)
         unseen = unseen.reshape((count,) * 3)
         on = np.floor((surfaces_m - self._place[:3]) / _CELL_M).astype(np.int64) - first.astype(np.int64)
         unseen[tuple(on[((on >= 0) & (on < count)).all(axis=1)].T)] = False

@@ -13,6 +13,7 @@ from robot_side.compiled.kernel import (
     compiled,
     input_array,
     input_indices,
+    output_array,
     output_indices,
 )
 from robot_side.compiled.vectors import Vector, load, norm, subtract
@@ -50,31 +51,32 @@ def _solids(body: OwnBody) -> tuple[IntArray, FloatArray, FloatArray, FloatArray
     return np.ascontiguousarray(body.kinds), positions_m, rotations, sizes_m
 
 
-def within(points_m: FloatArray, body: OwnBody, padding_m: float) -> LabelArray:
-    """Return (n,) 1 for the points (n, 3) that are within `padding_m` of the body."""
-    found = np.zeros(len(points_m), dtype=np.uint8)
-    _find_within(np.ascontiguousarray(points_m), *_solids(body), padding_m, found)
+def beyond_m(points_m: FloatArray, body: OwnBody) -> FloatArray:
+    """Return the signed distances (n,) of points (n, 3) from the surface of the union of the solids; inside below 0.
+
+    For ellipsoids, and inside several solids at once, the amount is at most the true one.
+    """
+    found = np.full(len(points_m), math.inf)
+    _find_beyond(np.ascontiguousarray(points_m), *_solids(body), found)
     return found
 
 
 @compiled(
-    *(input_array(2), input_indices(), input_array(2), input_array(3), input_array(2), FLOAT64),
-    array_of(np.uint8, 1),
+    *(input_array(2), input_indices(), input_array(2), input_array(3), input_array(2)),
+    output_array(1),
 )
-def _find_within(
+def _find_beyond(
     points_m: FloatArray,
     kinds: IntArray,
     positions_m: FloatArray,
     rotations: FloatArray,
     sizes_m: FloatArray,
-    padding_m: float,
-    found: LabelArray,
+    found: FloatArray,
 ) -> None:
     for n in range(found.size):
         for k in range(kinds.size):
             away = subtract(load(points_m, n), load(positions_m, k))
-            if _beyond(kinds[k], load(sizes_m, k), _turned(rotations, k, away)) <= padding_m:
-                found[n] = 1
+            found[n] = min(found[n], _beyond(kinds[k], load(sizes_m, k), _turned(rotations, k, away)))
 
 
 @building_block
@@ -90,19 +92,26 @@ def _turned(rotations: FloatArray, k: int, a: Vector) -> Vector:
 
 @building_block
 def _beyond(kind: int, size: Vector, point: Vector) -> float:
-    """Return the distance of a point from a solid in the solid's own frame; of ellipsoids at most as much."""
+    """Return a point's distance from a solid in the solid's frame, inside below 0; of ellipsoids at most as much."""
     x, y, z = abs(point[0]), abs(point[1]), abs(point[2])
     if kind == BOX:
-        return norm((max(x - size[0], 0.0), max(y - size[1], 0.0), max(z - size[2], 0.0)))
+        return _beyond_box((x - size[0], y - size[1], z - size[2]))
     if kind == CAPSULE:
         return norm((x, y, max(z - size[1], 0.0))) - size[0]
     if kind == CYLINDER:
-        return norm((max(math.sqrt(x * x + y * y) - size[0], 0.0), max(z - size[1], 0.0), 0.0))
+        across, along = math.sqrt(x * x + y * y) - size[0], z - size[1]
+        return _beyond_box((across, along, min(across, along, 0.0)))
     if kind == ELLIPSOID:
         # Along the way to the centre the surface is further than across it by at most the ratio of the axes.
         length = norm((x / size[0], y / size[1], z / size[2]))
         return (length - 1.0) * min(size[0], size[1], size[2])
     return norm((x, y, z)) - size[0]
+
+
+@building_block
+def _beyond_box(over: Vector) -> float:
+    x, y, z = over
+    return norm((max(x, 0.0), max(y, 0.0), max(z, 0.0))) + min(max(x, y, z), 0.0)
 
 
 @building_block

@@ -27,6 +27,7 @@ EXTRAS: Final[Mapping[str, tuple[str, tuple[str, ...]]]] = {
     "video": ("pictures in H.264, a tenth of JPEG's bytes or less", ("av",)),
     "record": ("recording runs", ("foxglove", "mcap")),
     "experiments": ("plots, Parquet, LeRobot, sweeps over many runs", ("matplotlib", "pyarrow", "distributed")),
+    "recorded": ("depth pictures of a ROS 2 recording", ("rosbags",)),
     "study": ("a study's report and plan", ("statsmodels", "pandas", "pyarrow", "matplotlib")),
 }
 """Purpose and imported modules of each extra of the package, by its name"""

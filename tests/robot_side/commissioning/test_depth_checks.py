@@ -8,7 +8,8 @@ import pytest
 
 from robot_side.commissioning.checklist import Check
 from robot_side.commissioning.depth_checks import depth_checks
-from robot_side.commissioning.depth_figures import LookedAt, beyond_solids
+from robot_side.commissioning.depth_figures import LookedAt
+from robot_side.depth.own_body import beyond_m
 from robot_side.depth.picture import CameraPose, DepthErrors, DepthPicture, OwnBody
 from robot_side.depth.support import supported
 from robot_side.depth.view import view_of
@@ -44,7 +45,7 @@ def looked(
 
 
 @pytest.mark.parametrize(
-    ("body", "point_m", "beyond_m"),
+    ("body", "point_m", "distance_m"),
     [
         (solid(GeomKind.BOX, 0.05, 0.1, 0.2), (0.13, 0.09, 0.2), 0.05),
         (solid(GeomKind.BOX, 0.05, 0.1, 0.2), (0.08, 0.0, 0.2), -0.02),
@@ -56,16 +57,16 @@ def looked(
     ],
 )
 def test_distances_from_a_solid_have_a_sign(
-    body: OwnBody, point_m: tuple[float, float, float], beyond_m: float
+    body: OwnBody, point_m: tuple[float, float, float], distance_m: float
 ) -> None:
-    assert beyond_solids(np.array([point_m]), body) == pytest.approx([beyond_m])
+    assert beyond_m(np.array([point_m]), body) == pytest.approx([distance_m])
 
 
 def test_the_nearest_solid_counts() -> None:
     one, other = solid(GeomKind.SPHERE, 0.1), solid(GeomKind.SPHERE, 0.05)
     names = "kinds", "positions_m", "rotations", "sizes_m"
     both = OwnBody(*(np.concatenate([getattr(one, name), getattr(other, name)]) for name in names))
-    assert beyond_solids(np.array([[0.0, 0.0, 0.32]]), both) == pytest.approx([0.02])
+    assert beyond_m(np.array([[0.0, 0.0, 0.32]]), both) == pytest.approx([0.02])
 
 
 def test_a_good_camera_passes() -> None:
