@@ -1,6 +1,7 @@
 """Measurement of a simulated gripper's travel, by driving it in empty space: what its inputs do, and its gap."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import lru_cache
 from itertools import product
 from typing import Any, Final
 
@@ -92,11 +93,29 @@ def measure_gripper(scene: Simulated) -> GripperTravel | None:
     """Measure the gripper's travel, by driving a copy of the scene's gripper to both ends in empty space.
 
     None without a gripper, or if its jaws do not close beside the tool. ConfigurationError for a gripper actuator whose
-    range of inputs is not known.
+    range of inputs is not known. The same model in the same configuration is measured once in a process.
     """
-    model, actuators, controls = scene.model, scene.robot.gripper_actuators, scene.robot.gripper_controls
-    if actuators.size == 0:
+    if scene.robot.gripper_actuators.size == 0:
         return None
+    saved = np.empty(mujoco.mj_sizeModel(scene.model), dtype=np.uint8)
+    mujoco.mj_saveModel(scene.model, None, saved)
+    return _measured(_Same(saved.tobytes(), scene.robot.site, scene.data.qpos.tobytes(), scene))
+
+
+@dataclass(frozen=True)
+class _Same:
+    """Scene that equals another one if their grippers measure the same."""
+
+    model: bytes
+    site: int
+    start: bytes
+    scene: Simulated = field(compare=False)
+
+
+@lru_cache(maxsize=8)
+def _measured(same: _Same) -> GripperTravel | None:
+    scene = same.scene
+    model, actuators, controls = scene.model, scene.robot.gripper_actuators, scene.robot.gripper_controls
     unknown = actuators[~model.actuator_ctrllimited[controls].astype(bool)]
     if unknown.size:
         named = model.actuator(int(unknown[0])).name or int(unknown[0])

@@ -27,6 +27,17 @@ from robot_side.gripper.surface_cover import cover_surface
 from tests.helpers.arm_models import TENDON_GRIPPER, planar_arm
 
 
+def test_a_gripper_is_measured_anew_when_the_model_or_its_start_changes(tmp_path: Path) -> None:
+    scene = load_scene(planar_arm(tmp_path), "tcp")
+    travel = measure_gripper(scene)
+    assert measure_gripper(load_scene(planar_arm(tmp_path), "tcp")) is travel
+    scene.data.qpos[0] += 0.1
+    assert measure_gripper(scene) is not travel
+    scene.data.qpos[0] -= 0.1
+    scene.model.actuator_gainprm[scene.robot.gripper_actuators[0], 0] *= 2.0
+    assert measure_gripper(scene) is not travel
+
+
 def test_where_inputs_move_nothing_the_last_counts_and_at_the_end_the_first() -> None:
     np.testing.assert_array_equal(rising(np.array([0.0, 0.3, 0.3, 0.25, 0.7, 1.0, 1.0])), [0, 3, 4, 5])
     np.testing.assert_array_equal(rising(np.linspace(0.0, 1.0, 4)), [0, 1, 2, 3])
