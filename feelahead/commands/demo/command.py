@@ -60,6 +60,8 @@ def demo(arguments: Sequence[str]) -> int:
                 merged = merge_summaries(read_summary(summaries["robot"]), read_summary(summaries["operator"]), errors)
                 if recorder is not None:
                     merged["recording"] = merged.get("recording", {}) | recorder.finish()
+                    if (why := merged["recording"]["error"]) is not None:
+                        errors.append(f"the recording is not whole: {why}")
             # Before the report, whose output may block until somebody reads it.
             if settings.summary is not None:
                 write_json("--summary", settings.summary, merged)

@@ -211,8 +211,8 @@ ROBOT = ("--bind=tcp://127.0.0.1:0",)
 # No file of this process gets longer than that, as on a full disk.
 FULL = """
 import os, resource, sys
-resource.setrlimit(resource.RLIMIT_FSIZE, (100, 100))
-os.execv(sys.argv[1], sys.argv[1:])
+resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[1]),) * 2)
+os.execv(sys.argv[2], sys.argv[2:])
 """
 
 
@@ -220,12 +220,21 @@ def test_a_summary_on_a_full_disk_is_one_line_and_the_old_one_stays(tmp_path: Pa
     path = tmp_path / "out.json"
     path.write_text("old")
     arguments = [*NOWHERE, "--duration=0.2", f"--summary={path}", "--status=none"]
-    code, _, complaint = ended("-c", FULL, sys.executable, "-P", "-m", "operator_side", *arguments)
+    code, _, complaint = ended("-c", FULL, "100", sys.executable, "-P", "-m", "operator_side", *arguments)
     assert code == 2
     [line] = complaint.splitlines()
     assert line.startswith(f"feelahead-operator: --summary {path}: cannot be written: File too large; valid: ")
     assert path.read_text() == "old"
     assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_demo_whose_recording_fills_the_disk_says_so_and_fails(tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    arguments = ["--duration=3", f"--record={path}", "--no-console", "--status=none"]
+    code, _, complaint = ended("-c", FULL, "30000", sys.executable, "-P", "-m", "feelahead", "demo", *arguments)
+    assert code == 1
+    assert complaint.splitlines()[-1] == "feelahead demo: the recording is not whole: File too large"
+    assert 0 < path.stat().st_size <= 30000
 
 
 @pytest.mark.parametrize(
