@@ -38,7 +38,7 @@ class Piece:
     @property
     def columns(self) -> Row:
         """Columns that the piece adds to each of its rows: the cell's scalar values, and the seed."""
-        scalars = {name: value for name, value in _plain(self.cell).items() if not isinstance(value, list | dict)}
+        scalars = {name: value for name, value in _plain(self.cell).items() if not isinstance(value, list | tuple | dict)}
         return scalars | {"seed": self.seed}
 
     def __str__(self) -> str:
