@@ -38,8 +38,8 @@ class Piece:
     @property
     def columns(self) -> Row:
         """Columns that the piece adds to each of its rows: the cell's scalar values, and the seed."""
-        scalars = {name: value for name, value in _plain(self.cell).items() if not isinstance(value, list | tuple | dict)}
-        return scalars | {"seed": self.seed}
+        values = _plain(self.cell).items()
+        return {name: one for name, one in values if not isinstance(one, list | tuple | dict)} | {"seed": self.seed}
 
     def __str__(self) -> str:
         return ", ".join(f"{name} {value}" for name, value in self.columns.items())

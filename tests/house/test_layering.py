@@ -153,7 +153,7 @@ ARROWS = """
         feelahead/study/trials
     feelahead/study: common common/command common/files robot_side/drivers/mujoco robot_side/laws/named.py
     feelahead/commands/bench_and_try.py: common common/files feelahead/lab
-    feelahead/study/trials: common/recording robot_side/laws/paper_settings.py robot_side/settings.py
+    feelahead/study/trials: common common/recording robot_side/laws/paper_settings.py robot_side/settings.py
         operator_side operator_side/people operator_side/settings.py feelahead/both_sides feelahead/lab
         feelahead/printing feelahead/study
     feelahead/commands/study: common common/command common/recording common/status operator_side/viewing/console

@@ -13,10 +13,10 @@ from common.arrays import FloatArray
 from common.recording.reading import open_recording
 from common.recording.topics import TYPES, Truth
 from feelahead.study.protocol import STANDS_S
-from robot_side.outcome.figures import MOVING_M_S
 
 _TRUTH: Final = "/truth"
 _STATUS: Final = "/robot/status"
+_MOVING_M_S: Final = 0.01
 NEAR_MM: Final = 5.0
 """Distance to an obstacle below which a gripper is exposed"""
 
@@ -98,7 +98,7 @@ def _mean_moving(enlargements: Sequence[tuple[float, float]], times_s: FloatArra
     those = np.array([one for one in enlargements if times_s[0] < one[0] <= times_s[-1]]).reshape(-1, 2)
     at_s = np.concatenate([times_s[:1], those[:, 0]])
     places_m = np.column_stack([np.interp(at_s, times_s, along_m) for along_m in tool_m.T])
-    moved = np.linalg.norm(np.diff(places_m, axis=0), axis=1) > MOVING_M_S * np.diff(at_s)
+    moved = np.linalg.norm(np.diff(places_m, axis=0), axis=1) > _MOVING_M_S * np.diff(at_s)
     return float(those[moved, 1].mean()) if moved.any() else None
 
 
