@@ -1,4 +1,4 @@
-"""Tables of docs/measurements.md, made from the CSV files in figures/, which `make figures` measures.
+"""Marked tables of docs/, made from the CSV files in figures/, which `make figures` measures.
 
     python -m feelahead.lab.measurements
 
@@ -12,14 +12,16 @@ from pathlib import Path
 from statistics import fmean, median
 from typing import Any, Final
 
+from feelahead.lab.approaches.evaluation import LINKS
+from feelahead.lab.approaches.pulls import PULL_KINDS
 from feelahead.lab.goals import Goal
 from feelahead.lab.intervals import mean_interval
-from feelahead.lab.questions import haptics, tick
+from feelahead.lab.questions import coverage, haptics, tick
 from feelahead.lab.table import Table
 from feelahead.printing.figures import short
 
 ROOT: Final = Path(__file__).parents[2]
-DOCUMENT: Final = ROOT / "docs" / "measurements.md"
+DOCUMENTS: Final = tuple(ROOT / "docs" / name for name in ("measurements.md", "feel.md"))
 FIGURES: Final = ROOT / "figures"
 MARKED: Final = re.compile(
     r"(<!-- (?P<name>(?P<file>\w+)[^\n]*?): by make figures -->\n).*?(?P<end><!-- end -->)", re.DOTALL
@@ -45,18 +47,18 @@ def _value(text: str) -> Any:
 
 
 def written(text: str, figures: Path = FIGURES) -> str:
-    """Return the document with each marked table made anew, and the commit of its figures.
+    """Return a document with each marked table made anew, and the commit of its figures.
 
     A table whose file is missing stays as it is.
     """
-    commit = (figures / "commit").read_text(encoding="utf-8").strip()
+    commits = dict(line.split() for line in (figures / "commits").read_text(encoding="utf-8").splitlines())
 
     def anew(found: re.Match[str]) -> str:
         if not (figures / f"{found['file']}.csv").exists():
             return found[0]
         lines = [f"| {' | '.join(cells)} |" for cells in TABLES[found["name"]](read(found["file"], figures))]
         lines.insert(1, "|---" * (lines[0].count("|") - 1) + "|")
-        return "\n".join([found[1] + f"Commit {commit}:\n", *lines, found["end"]])
+        return "\n".join([found[1] + f"Commit {commits[found['file']]}:\n", *lines, found["end"]])
 
     return MARKED.sub(anew, text)
 
@@ -171,6 +173,49 @@ def _cover(parts: Table) -> Lines:
     )
 
 
+def _coverage(cells: Table) -> Lines:
+    """Yield a row for each pull and link; entries of the probabilities are separated by a slash."""
+    yield (
+        "pull",
+        "link",
+        "cells that hold",
+        "covered at least (scene, at the last)",
+        "false alarms a minute",
+        "share of the time",
+    )
+    order = PULL_KINDS.index, list(LINKS).index
+    groups = Table(sorted(cells, key=lambda row: (order[0](row["pull"]), order[1](row["link"])))).groups("pull", "link")
+    for (pull, link), those in groups:
+        of = [rows for _, rows in those.groups("probability")]
+        ahead = [Table(row for row in rows if row["coverage"] is not None) for rows in of]
+        holds = [f"{sum(rows.values('holds')):g}" for rows in ahead]
+        least = [min(rows, key=lambda row: float(row["coverage"])) for rows in ahead]
+        yield (
+            *(pull, link, f"{' / '.join(holds)} of {len(ahead[-1])}"),
+            " / ".join(f"{row['coverage']:.3f}" for row in least) + f" ({least[-1]['scene']})",
+            *map(" / ".join, zip(*map(coverage.pooled_alarms, of), strict=True)),
+        )
+
+
+def _alarms(cells: Table) -> Lines:
+    """Yield a row for each kind of scene and pull, over all probabilities; of swerves in clutter one for each link."""
+    yield "scenes", "pull", "link", "false alarms a minute", "share of the time", "minutes"
+    clutter, passed = cells.where(scene="cluttered"), Table(row for row in cells if row["coverage"] is None)
+    moving = Table(row for row in cells if row["scene"].endswith("mm/s"))
+    resting = [row for row in cells if row["coverage"] is not None and row not in moving.rows]
+    free = Table(row for row in passed if row["scene"] in ("empty", "table_1_box", "wall_beside"))
+    kinds = [
+        ("nothing ahead", "all", "all", free),
+        ("clutter beside", "all but swerve", "all", Table(row for row in clutter if row["pull"] != "swerve")),
+        *(("clutter beside", "swerve", link, rows) for (link,), rows in clutter.where(pull="swerve").groups("link")),
+        *(("an object ahead", pull, "all", rows) for (pull,), rows in Table(resting).groups("pull")),
+        ("an object that comes", "bell", "all", Table(row for row in moving if "coming" in row["scene"])),
+        ("an object that flees", "bell", "all", Table(row for row in moving if "fleeing" in row["scene"])),
+    ]
+    for name, pull, link, rows in kinds:
+        yield name, pull, link, *coverage.pooled_alarms(rows), f"{sum(rows.values('judged_s')) / 60.0:.0f}"
+
+
 def _goals(goals: Iterable[Goal]) -> Lines:
     yield "goal", "measured", "asked", ""
     for goal in goals:
@@ -186,8 +231,11 @@ TABLES: Final[dict[str, Callable[[Table], Lines]]] = {
     "tick": _tick,
     "tick: goals": lambda rows: _goals(tick.goals(tick.TickSweep(), rows)),
     "cover": _cover,
+    "coverage": _coverage,
+    "coverage: alarms": _alarms,
 }
 
 
 if __name__ == "__main__":
-    DOCUMENT.write_text(written(DOCUMENT.read_text(encoding="utf-8")), encoding="utf-8")
+    for document in DOCUMENTS:
+        document.write_text(written(document.read_text(encoding="utf-8")), encoding="utf-8")

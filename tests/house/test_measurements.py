@@ -1,29 +1,39 @@
-"""The tables of docs/measurements.md come from stored figures."""
+"""The marked tables of docs/ come from stored figures."""
 
 import re
 from pathlib import Path
 
-from feelahead.lab.measurements import DOCUMENT, MARKED, TABLES, written
+import pytest
+
+from feelahead.lab.measurements import DOCUMENTS, FIGURES, MARKED, TABLES, written
 from feelahead.lab.table import Table
 from tests.helpers.repository import ROOT
 
-TEXT = DOCUMENT.read_text(encoding="utf-8")
+TEXTS = {document.name: document.read_text(encoding="utf-8") for document in DOCUMENTS}
+ALL = "\n".join(TEXTS.values())
 
 
 def test_every_table_stands_between_markers_and_below_the_command_that_make_figures_runs() -> None:
-    assert not re.search(r"^\|", MARKED.sub("", TEXT), re.MULTILINE)
-    assert [found["name"] for found in MARKED.finditer(TEXT)] == [*TABLES]
+    assert not re.search(r"^\|", MARKED.sub("", TEXTS["measurements.md"]), re.MULTILINE)
+    assert [found["name"] for found in MARKED.finditer(ALL)] == [*TABLES]
     asked = dict(re.findall(r"^figures/(\w+)\.csv: asks = (.+)$", (ROOT / "Makefile").read_text(), re.MULTILINE))
-    above = re.findall(r"^    feelahead (.+)\n\n<!-- (\w+): by make figures -->$", TEXT, re.MULTILINE)
+    above = re.findall(r"^    feelahead (.+)\n\n<!-- (\w+): by make figures -->$", ALL, re.MULTILINE)
     assert {name: command for command, name in above} == asked
+    assert {line.split()[0] for line in (FIGURES / "commits").read_text().splitlines()} == asked.keys()
 
 
-def test_the_tables_are_those_of_the_stored_figures() -> None:
-    assert written(TEXT) == TEXT
+def test_no_other_document_has_marked_tables() -> None:
+    marked = {path for path in (ROOT / "docs").rglob("*.md") if MARKED.search(path.read_text(encoding="utf-8"))}
+    assert marked == {*DOCUMENTS}
+
+
+@pytest.mark.parametrize("text", TEXTS.values(), ids=TEXTS)
+def test_the_tables_are_those_of_the_stored_figures(text: str) -> None:
+    assert written(text) == text
 
 
 def test_a_figure_copied_by_hand_does_not_last(tmp_path: Path) -> None:
-    (tmp_path / "commit").write_text("0123abcd\n")
+    (tmp_path / "commits").write_text("cover 0123abcd\n")
     (tmp_path / "cover.csv").write_text("part,spheres,sticks_out_mm,stands_out_mm\npalm,7,0.0,2.5\ntip,3,0.1,1.0\n")
     marked = "Before\n<!-- {}: by make figures -->\n| by hand | 99 |\n<!-- end -->\nAfter\n"
     once = written(marked.format("cover"), tmp_path)
@@ -36,7 +46,7 @@ def test_a_figure_copied_by_hand_does_not_last(tmp_path: Path) -> None:
 
 
 def test_intervals_of_haptics_resample_seeds_and_not_trials(tmp_path: Path) -> None:
-    (tmp_path / "commit").write_text("0123abcd\n")
+    (tmp_path / "commits").write_text("haptics 0123abcd\n")
     rows = [
         {
             "scene": "wall",
