@@ -60,7 +60,8 @@ class CoverageSettings(PaperFlags, Sweep):
     perception: Annotated[Perception, tyro.conf.arg(metavar="{objects,depth}")] = "objects"
     """What is perceived: the objects themselves, with the camera's error, or surfaces that depth cameras see."""
     only: Annotated[tuple[str, ...], tyro.conf.arg(metavar="TEXT...")] = ()
-    """Judge only cells whose name, such as 'wall/bell/200 ms', contains one of these texts."""
+    """Judge only cells whose name, such as 'wall/bell/200 ms', contains one of these texts. With --perception depth
+    and --quick, too, these are chosen among all cells."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -94,7 +95,7 @@ class CoverageSettings(PaperFlags, Sweep):
 
     def _cells(self) -> Iterator[tuple[PullKind, str, Placement]]:
         if self.perception == "depth":
-            return depth_cells(quick=self.quick)
+            return depth_cells(quick=self.quick and not self.only)
         return quick_cells() if self.quick else full_cells()
 
 
