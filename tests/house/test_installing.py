@@ -26,6 +26,7 @@ MODULES = {
     "operator": "hid hidraw viser trimesh",
     "video": "av",
     "recorded": "rosbags",
+    "tags": "cv2",
     "record": "foxglove mcap.reader mcap.writer",
     "bench": "mpmath overlap",
     "experiments": "matplotlib pyarrow distributed",

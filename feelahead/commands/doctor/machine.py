@@ -28,6 +28,7 @@ EXTRAS: Final[Mapping[str, tuple[str, tuple[str, ...]]]] = {
     "record": ("recording runs", ("foxglove", "mcap")),
     "experiments": ("plots, Parquet, LeRobot, sweeps over many runs", ("matplotlib", "pyarrow", "distributed")),
     "recorded": ("depth pictures of a ROS 2 recording", ("rosbags",)),
+    "tags": ("objects found by printed tags", ("cv2",)),
     "study": ("a study's report and plan", ("statsmodels", "pandas", "pyarrow", "matplotlib")),
 }
 """Purpose and imported modules of each extra of the package, by its name"""

@@ -231,6 +231,13 @@ def test_a_file_that_is_wrong_ends_it_with_one_line(
     assert complaint.count("\n") == 1
 
 
+def test_the_file_of_the_guide_is_accepted(tmp_path: Path) -> None:
+    guide = (ROOT / "docs" / "drivers.md").read_text(encoding="utf-8")
+    [block] = re.findall(r"^ +dictionary = .*?half_space = true$", guide, re.DOTALL | re.MULTILINE)
+    (tmp_path / "tags.toml").write_text(block)
+    assert [*EXAMPLE.Tags(tmp_path / "tags.toml").tags] == [3, 4]
+
+
 class Device:
     """Stand-in for cv2.VideoCapture on a clock of its own: two pictures have waited, then one comes each 30 ms."""
 
