@@ -64,6 +64,7 @@ COMMANDS = {
 RUNS = """
 import contextlib, importlib, importlib.metadata, importlib.util, io, json, sys
 present, absent, commands = json.loads(sys.argv[1])
+sys.OpenCV_REPLACE_SYS_PATH_0 = True  # behind a link cv2 does not find its own library otherwise
 answers = [[module for module in absent if importlib.util.find_spec(module)]]
 mains = {one.name: one.load() for one in importlib.metadata.distribution("feelahead").entry_points}
 for command in commands:
