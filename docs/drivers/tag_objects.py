@@ -91,8 +91,9 @@ class Tags:
         self.lens = np.array([[of.fx, 0, of.cx], [0, of.fy, of.cy], [0, 0, 1]]), np.array(of.distortion)
         self.turn = Rotation.from_quat(of.quaternion, scalar_first=True)
         self.tags = {tag.id: (box, tag) for box in self.file.objects for tag in box.tags}
-        if len(self.tags) < sum(len(box.tags) for box in self.file.objects):
-            raise ValueError("objects: tags: an id is there twice; valid: each tag once")
+        boxes = self.file.objects
+        if len(self.tags) < sum(len(box.tags) for box in boxes) or len({box.name for box in boxes}) < len(boxes):
+            raise ValueError("objects: an id of tags or a name is there twice; valid: each once")
         self.kept = dict[str, tuple[dict[str, Any], float]]()
 
     def objects(self, picture: Any, taken_s: float) -> list[dict[str, Any]]:
@@ -119,6 +120,8 @@ class Tags:
         into = Rotation.from_quat(tag.quaternion, scalar_first=True).inv()  # from the object's frame to the tag's
         points_m = into.apply(POINTS * box.box - tag.position_m)
         _, turns, ways, _ = cv2.solvePnPGeneric(square_m, corners, *self.lens, flags=cv2.SOLVEPNP_IPPE_SQUARE)
+        if len(turns) < 2:
+            return None  # these are the corners of no square
         for turn, way in zip(turns, ways, strict=True):
             pixels, slopes = cv2.projectPoints(square_m, turn, way, *self.lens)
             matrix, by = cv2.Rodrigues(turn)
@@ -134,7 +137,7 @@ class Tags:
         apart_m = np.linalg.norm(other[2] - at_m, axis=1).max()
         if other[0] - error < DOUBT * noise_px**2 or apart_m < APART * sd_m:  # the latter where it is seen straight on
             sd_m = math.hypot(sd_m, apart_m)
-        if sd_m > self.file.most_sd_m:
+        if not sd_m <= self.file.most_sd_m:
             return None
         world = (self.turn * Rotation.from_matrix(matrix) * into).as_quat(scalar_first=True)
         thing = {"name": box.name, "role": box.role, "box": box.box, "sd_m": math.hypot(sd_m, of.sd_m)}

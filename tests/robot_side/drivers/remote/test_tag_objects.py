@@ -179,6 +179,9 @@ def test_a_tag_of_which_two_poses_fit_is_left_out_and_one_that_fits_badly_is_bel
     assert tags(tmp_path, ("cx = ", "noise_px = 0.02\ncx = ")).place(3, far) is not None
     near = corners_px(0.06, slanted(35.0, 0.5), (0.0, 0.0, 0.3))
     bent = near + np.array([[2.0, 0.0], [0.0, 0.0], [2.0, 0.0], [0.0, 0.0]])
+    # For four corners nearly in a line OpenCV finds no pose at all.
+    line = np.array([[315.835, 114.445], [315.643, 114.287], [315.527, 114.155], [315.494, 114.110]])
+    assert perception.place(3, line) is None
     assert perception.place(3, bent)["sd_m"] > 2.0 * perception.place(3, near)["sd_m"]
 
 
@@ -218,7 +221,8 @@ def test_what_is_not_seen_stays_for_the_time_of_the_file_less_surely_and_is_gone
         ("fx = 600.0", "fx = -1.0", "`$.camera.fx`"),
         ("quaternion = [0.4, 0.8, 0.2, 0.4]", "quaternion = [0.0, 0.0, 0.0, 0.0]", "zero norm"),
         ("side_m = 0.06", "side_mm = 60", "unknown field `side_mm` - at `$.objects[0].tags[0]`"),
-        ("id = 6", "id = 5", "an id is there twice"),
+        ("id = 6", "id = 5", "is there twice"),
+        ("post", "target box", "is there twice"),
     ],
 )
 def test_a_file_that_is_wrong_ends_it_with_one_line(
