@@ -24,6 +24,12 @@ def test_the_example_has_the_shape_that_the_documents_promise() -> None:
     assert len(schedule(found, 1)) == 5 * 3 * 2 * found.trials
 
 
+def test_the_simulated_example_is_a_whole_number_of_squares() -> None:
+    found = load_protocol(ROOT / "examples" / "simulated_study.toml")
+    assert [*found.conditions] == ["off", "swept", "paper", "margin"]
+    assert (found.participants % 4, len(schedule(found, 1))) == (0, 4 * 3 * 2 * 3)
+
+
 def test_the_hash_is_of_what_is_said_and_not_of_how(tmp_path: Path) -> None:
     same, other = tmp_path / "same.toml", tmp_path / "other.toml"
     same.write_text("# a comment\n\n" + EXAMPLE.read_text())
