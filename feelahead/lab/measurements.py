@@ -179,7 +179,7 @@ def _coverage(cells: Table) -> Lines:
         "pull",
         "link",
         "cells that hold",
-        "covered at least (scene, at the last)",
+        "covered at least (scene, at the greatest P)",
         "false alarms a minute",
         "share of the time",
     )
@@ -201,14 +201,15 @@ def _alarms(cells: Table) -> Lines:
     """Yield a row for each kind of scene and pull, over all probabilities; of swerves in clutter one for each link."""
     yield "scenes", "pull", "link", "false alarms a minute", "share of the time", "minutes"
     clutter, passed = cells.where(scene="cluttered"), Table(row for row in cells if row["coverage"] is None)
-    moving = Table(row for row in cells if row["scene"].endswith("mm/s"))
-    resting = [row for row in cells if row["coverage"] is not None and row not in moving.rows]
-    free = Table(row for row in passed if row["scene"] in ("empty", "table_1_box", "wall_beside"))
+    ahead = Table(row for row in cells if row["coverage"] is not None)
+    moving = Table(row for row in ahead if row["scene"].endswith("mm/s"))
+    resting = Table(row for row in ahead if not row["scene"].endswith("mm/s"))
+    free = Table(row for row in passed if row["scene"] != "cluttered")
     kinds = [
         ("nothing ahead", "all", "all", free),
         ("clutter beside", "all but swerve", "all", Table(row for row in clutter if row["pull"] != "swerve")),
         *(("clutter beside", "swerve", link, rows) for (link,), rows in clutter.where(pull="swerve").groups("link")),
-        *(("an object ahead", pull, "all", rows) for (pull,), rows in Table(resting).groups("pull")),
+        *(("an object ahead", pull, "all", rows) for (pull,), rows in resting.groups("pull")),
         ("an object that comes", "bell", "all", Table(row for row in moving if "coming" in row["scene"])),
         ("an object that flees", "bell", "all", Table(row for row in moving if "fleeing" in row["scene"])),
     ]

@@ -31,7 +31,7 @@ _LOOK_S: Final = 0.25
 _ARMING_S: Final = 6.0
 """Longest time before a trial begins, beyond two round trips"""
 _TURN: Final = "10ms"
-"""Period of both sides' turns: where only the stop counts it does for that of people's trials, in 0.65 of the time"""
+"""Period of both sides' turns. Stops are those of turns of 4 ms (docs/benchmarks.md), in two thirds of the time"""
 
 
 @dataclass(frozen=True)

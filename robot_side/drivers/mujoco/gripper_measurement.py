@@ -2,8 +2,10 @@
 
 from dataclasses import dataclass, field
 from functools import lru_cache
+from hashlib import sha256
 from itertools import product
 from typing import Any, Final
+from weakref import ref
 
 import mujoco  # type: ignore[import-untyped]
 import numpy as np
@@ -99,7 +101,7 @@ def measure_gripper(scene: Simulated) -> GripperTravel | None:
         return None
     saved = np.empty(mujoco.mj_sizeModel(scene.model), dtype=np.uint8)
     mujoco.mj_saveModel(scene.model, None, saved)
-    return _measured(_Same(saved.tobytes(), scene.robot.site, scene.data.qpos.tobytes(), scene))
+    return _measured(_Same(sha256(saved.tobytes()).digest(), scene.robot.site, scene.data.qpos.tobytes(), ref(scene)))
 
 
 @dataclass(frozen=True)
@@ -107,14 +109,16 @@ class _Same:
     """Scene that equals another one if their grippers measure the same."""
 
     model: bytes
+    """Hash of the model"""
     site: int
     start: bytes
-    scene: Simulated = field(compare=False)
+    scene: ref[Simulated] = field(compare=False)
+    """The scene itself, which nothing keeps once it was measured"""
 
 
 @lru_cache(maxsize=8)
 def _measured(same: _Same) -> GripperTravel | None:
-    scene = same.scene
+    scene: Any = same.scene()  # alive, as the caller has it
     model, actuators, controls = scene.model, scene.robot.gripper_actuators, scene.robot.gripper_controls
     unknown = actuators[~model.actuator_ctrllimited[controls].astype(bool)]
     if unknown.size:
