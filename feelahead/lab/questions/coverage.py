@@ -33,7 +33,7 @@ COMPARED: Final = ("swept", "swept_robot", "paper", "none", "full")
 QUICK_SIZES: Final = (10, 4)
 """Number of approaches of each motion, and of placements of the objects for each, with --quick."""
 QUICK_JUDGED_S, JUDGED_S = 60.0, 600.0
-"""Minimum time judged for false alarms, in seconds, over all cells of one kind of motion."""
+"""Minimum time judged for false alarms, in seconds, over all cells of one kind of motion; by depth, for each cell."""
 _MARKS: Final = ("o", "s", "^", "D")
 _CELL: Final = ("scene", "seen_by", "pull", "link", "camera_mm", "encoder_factor", "probability")
 _Probability = Annotated[float, Meta(gt=0.0, le=0.9999)]
@@ -74,22 +74,24 @@ class CoverageSettings(PaperFlags, Sweep):
 
     def pulls(self) -> list[Pulls]:
         """Return the motions with their chosen cells; motions with the most cells come first."""
-        found: dict[tuple[PullKind, str, str], list[Placement]] = {}
+        found: dict[tuple[PullKind, str, str, str], list[Placement]] = {}
         for pull, link, cell in self._cells():
             if not self.only or any(text in cell.key(pull, link) for text in self.only):
-                mine = found.setdefault((pull, link, HOMES.get(cell.scene, "empty")), [])
+                # Pictures take minutes a cell: each is then kept as soon as it is judged.
+                alone = cell.key(pull, link) if self.perception == "depth" else ""
+                mine = found.setdefault((pull, link, HOMES.get(cell.scene, "empty"), alone), [])
                 mine += [cell] if cell not in mine else []
         sizes = QUICK_SIZES if self.quick else (25, 8)
         probabilities = (0.5, 0.9) if self.quick else (0.5, 0.9, 0.99, 0.999)
         chosen = tuple(sorted(set(self.probabilities))) or probabilities
         judged_s = QUICK_JUDGED_S if self.quick else JUDGED_S
-        of_kind = Counter((pull, link) for (pull, link, _), cells in found.items() for _ in cells)
+        of_kind = Counter((pull, link, alone) for (pull, link, _, alone), cells in found.items() for _ in cells)
         motions = [
             Pulls(
                 *(pull, link, home, tuple(cells), sizes, chosen, self.laws, (self.paper,)),
-                judged_s=judged_s / of_kind[pull, link],
+                judged_s=judged_s / of_kind[pull, link, alone],
             )
-            for (pull, link, home), cells in found.items()
+            for (pull, link, home, alone), cells in found.items()
         ]
         return sorted(motions, key=lambda pulls: -len(pulls.cells))
 
