@@ -7,7 +7,7 @@ farthest zone that the trigger had reached by then was at full strength.
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from functools import cache
+from functools import cache, lru_cache
 from itertools import count
 from typing import Final
 
@@ -186,7 +186,7 @@ def _frames(sd_m: float) -> SurfaceFrames:
     return SurfaceFrames(MapSettings().slots, sd_m, CameraSettings().unseen_m_s)
 
 
-@cache
+@lru_cache(maxsize=1)
 def _rig(scene: str, depth: DepthCameraSettings, encoder_factor: float) -> DepthRig:
     encoder = Encoder(encoder_factor * EncoderSettings().sigma_rad, EncoderSettings().resolution_rad)
     return DepthRig(_scene(scene), depth, MapSettings(), encoder, 0)
