@@ -123,7 +123,7 @@ paper: $(VENV)/.installed $(VENV)/.kernels ## figures 1 to 5 of the paper from t
 notebook: $(VENV)/.installed $(VENV)/.kernels ## examples/first_episode.ipynb from tests/examples/first_episode.md, executed anew
 	$(BIN)/python -m tests.examples.notebook
 
-# Hours, on a machine with nothing else to do. A stopped run goes on, and what this commit has measured is kept.
+# A night, on a machine with nothing else to do. A stopped run goes on. What no source has changed since is kept.
 # One alone: make figures/coverage.csv figures
 figures/haptics.csv: asks = try haptics --seeds 10
 figures/camera.csv: asks = try haptics --scenes shelf --delays 0 200 --seeds 4 --camera-mm 1
@@ -132,17 +132,46 @@ figures/definition.csv: asks = bench felt
 figures/tick.csv: asks = bench tick --quick
 figures/cover.csv: asks = bench felt --cover
 figures/coverage.csv: asks = bench coverage --laws swept --probabilities 0.5 0.9
-FIGURES = $(patsubst %,figures/%.csv,haptics camera demo definition tick cover coverage)
+figures/laws.csv: asks = bench coverage --quick --picture docs/feel/coverage.png
+figures/error.csv: asks = bench error --picture docs/feel/error.png
+figures/approach.csv: asks = try approach --force 2 3 --seeds 2 --law swept paper none --compensation operator robot \
+	--model tests/data/wall.xml tests/data/plate.xml tests/data/ball.xml tests/data/post.xml \
+	tests/data/rod_2mm.xml tests/data/rod_5mm.xml tests/data/rod_10mm.xml tests/data/wall_45.xml \
+	--link "delay 0ms" "delay 50ms 10ms distribution normal" \
+	"delay 200ms 10ms distribution normal" "delay 400ms 10ms distribution normal"
+figures/depth.csv: asks = bench coverage --quick --perception depth --laws swept --probabilities 0.9 --only bell
+figures/haptics_depth.csv: asks = try haptics --perception depth --scenes wall slot --delays 100 --seeds 10 --arms reacting
+figures/overlap.csv: asks = bench overlap --peer-header overlap.hpp --picture docs/benchmarks/overlap.png
+figures/accuracy.csv: asks = bench accuracy --quick --peer-header overlap.hpp --picture docs/benchmarks/accuracy.png
+figures/stability.csv: asks = bench stability --quick
+figures/shared.csv: asks = bench felt --shared
+figures/tiles.csv: asks = bench felt --tiles
+FIGURES = $(patsubst %,figures/%.csv,haptics camera demo definition tick cover coverage laws error approach depth \
+	haptics_depth overlap accuracy stability shared tiles)
 COMMIT = $(shell git rev-parse --short=8 HEAD)
+SOURCE = common feelahead operator_side robot_side ':!feelahead/lab/measurements'
+AS_COMMITTED = git diff --stat --exit-code HEAD -- $(SOURCE)
+UNCHANGED = git diff --quiet $$(sed -n 's/^$(@:figures/%.csv=%) //p' figures/commits) -- $(SOURCE)
+
+# The published package's header, which needs a compiler and Eigen (libeigen3-dev): else its C++ row is named as missing.
+overlap.hpp: $(VENV)/.installed
+	$(BIN)/python -m pip download --disable-pip-version-check --quiet --no-deps --no-binary overlap --dest $(VENV) overlap==0.2.0
+	tar --extract --to-stdout --file $(VENV)/overlap-0.2.0.tar.gz overlap-0.2.0/include/overlap/overlap.hpp > $@
+figures/overlap.csv figures/accuracy.csv: overlap.hpp
 
 $(FIGURES): figures/%.csv: anew
-	git diff --stat --exit-code HEAD -- '*.py'
-	grep -qx '$* $(COMMIT)' figures/commits || { \
-	$(BIN)/feelahead $(asks) --resume figures/$*-$(COMMIT).jsonl --csv $@ && rm figures/$*-*.jsonl && \
+	$(AS_COMMITTED)
+	$(UNCHANGED) || { $(BIN)/feelahead $(asks) --resume figures/$*-$(COMMIT).jsonl --csv $@ && rm figures/$*-*.jsonl && \
 	sed -i 's/^$* .*/$* $(COMMIT)/' figures/commits; }
 
+figures/study.csv: asks = study examples/simulated_study.toml --simulated 12 --out figures/study
+figures/study.csv: anew
+	$(AS_COMMITTED)
+	$(UNCHANGED) || { $(BIN)/feelahead $(asks) && $(BIN)/python -m feelahead.lab.measurements --study figures/study && \
+	rm -r figures/study && sed -i 's/^\(study\|contrasts\) .*/\1 $(COMMIT)/' figures/commits; }
+
 .PHONY: anew
-figures: $(VENV)/.installed $(VENV)/.kernels $(FIGURES) ## every figure of marked tables in docs/ measured by this commit, the tables written
+figures: $(VENV)/.installed $(VENV)/.kernels $(FIGURES) figures/study.csv ## every figure of marked tables in docs/ measured anew, the tables written
 	$(BIN)/python -m feelahead.lab.measurements
 
 # As for the pictures. A run takes at most two minutes, half a minute as a rule: make driving ARGS="--delays 0 150 --seeds 2 --csv F"

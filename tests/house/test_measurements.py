@@ -5,21 +5,30 @@ from pathlib import Path
 
 import pytest
 
-from feelahead.lab.measurements import DOCUMENTS, FIGURES, MARKED, TABLES, written
+from feelahead.lab.measurements import approaches, coverages, studies
+from feelahead.lab.measurements.documents import DOCUMENTS, FIGURES, MARKED, TABLES, written
 from feelahead.lab.table import Table
 from tests.helpers.repository import ROOT
 
 TEXTS = {document.name: document.read_text(encoding="utf-8") for document in DOCUMENTS}
 ALL = "\n".join(TEXTS.values())
+MAKEFILE = (ROOT / "Makefile").read_text(encoding="utf-8")
 
 
 def test_every_table_stands_between_markers_and_below_the_command_that_make_figures_runs() -> None:
     assert not re.search(r"^\|", MARKED.sub("", TEXTS["measurements.md"]), re.MULTILINE)
-    assert [found["name"] for found in MARKED.finditer(ALL)] == [*TABLES]
-    asked = dict(re.findall(r"^figures/(\w+)\.csv: asks = (.+)$", (ROOT / "Makefile").read_text(), re.MULTILINE))
-    above = re.findall(r"^    feelahead (.+)\n\n<!-- (\w+): by make figures -->$", ALL, re.MULTILINE)
+    assert sorted(found["name"] for found in MARKED.finditer(ALL)) == sorted(TABLES)
+    asked = dict(re.findall(r"^figures/(\w+)\.csv: asks = (.+)$", _joined(MAKEFILE), re.MULTILINE))
+    above = re.findall(r"^    feelahead (.+)\n\n<!-- (\w+): by make figures -->$", _joined(ALL), re.MULTILINE)
     assert {name: command for command, name in above} == asked
-    assert {line.split()[0] for line in (FIGURES / "commits").read_text().splitlines()} == asked.keys()
+    commits = {line.split()[0] for line in (FIGURES / "commits").read_text().splitlines()}
+    assert commits == asked.keys() | {"contrasts"}
+    assert commits == {path.stem for path in FIGURES.glob("*.csv")}
+
+
+def _joined(text: str) -> str:
+    """Return the text with lines that a backslash continues as one."""
+    return re.sub(r" \\\n\s+", " ", text)
 
 
 def test_no_other_document_has_marked_tables() -> None:
@@ -72,3 +81,37 @@ def test_intervals_of_haptics_resample_seeds_and_not_trials(tmp_path: Path) -> N
     # Four pairs of two seeds: as wide as for one delay.
     assert lines[7].startswith("| **wall, all** | 2/4 at 100 (150) | 0/4 | 0/4 | 2 / 4 / 4 |")
     assert "| -12.5 [-25.0, +0.0] |" in lines[7]
+
+
+def test_a_cell_by_depth_that_does_not_hold_is_bold_with_its_lower_end() -> None:
+    seen = {"scene": "wall", "coverage": 0.95, "low": 0.88, "alarms_per_min": 4.4, "holds": False}
+    cells = [
+        seen | {"seen_by": "objects", "coverage": 1.0, "holds": True},
+        seen | {"seen_by": "wrist, noise x1, mount 2 mm"},
+        seen | {"seen_by": "both, noise x2, mount 2 mm", "coverage": 0.993, "holds": True},
+    ]
+    _, *lines = map(list, coverages.depth(Table(cells)))
+    assert lines == [["wall", "1.00, 4", "", "**0.95 [0.88]**, 4", ""]]
+    _, *others = map(list, coverages.other_errors(Table(cells)))
+    assert others == [["wall", "both", "", "0.99, 4", "", ""]]
+
+
+def test_an_approach_that_touches_in_one_of_two_runs_says_so() -> None:
+    run = {"model": "tests/data/ball.xml", "force_n": 2.0, "link": "delay 0ms", "compensation": "operator"}
+    stops, touches = {"stops_at_mm": 7.0, "contact_speed_mm_s": None}, {"stops_at_mm": None, "contact_speed_mm_s": 72.0}
+    runs = [run | {"law": "swept"} | stops, run | {"law": "swept"} | touches, run | {"law": "none"} | touches]
+    _, *lines = map(list, approaches.approach(Table(runs)))
+    assert lines == [["ball", "2", "no haptics", "hits at 72"], ["ball", "2", "swept", "7.0, 1 hit"]]
+
+
+def test_hits_of_a_study_are_counted_over_its_delays() -> None:
+    cell = {"condition": "off", "trials": 72.0}
+    values = {"hit": (0.25, 0.125), "completed": (0.5, 1.0), "time_s": (20.04, 30.0)}
+    cells = [
+        cell | {"outcome": outcome, "delay_ms": delay_ms, "value": value}
+        for outcome, of in values.items()
+        for delay_ms, value in zip((100.0, 0.0), of, strict=True)
+    ]
+    heading, line = map(list, studies.outcomes(Table(cells)))
+    assert heading[2] == "completed, %: 0 / 100 ms"
+    assert line == ["off", "27 of 144", "100 / 50", "30.0 / 20.0"]

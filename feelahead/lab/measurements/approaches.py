@@ -1,0 +1,48 @@
+"""Tables of approaches: where a finger of constant force stops, and how well its motion is predicted."""
+
+from collections.abc import Iterator
+from math import sqrt
+from pathlib import Path
+from statistics import fmean, median
+from typing import Final
+
+from feelahead.lab.approaches.prediction import COMPENSATIONS
+from feelahead.lab.measurements.lines import Lines
+from feelahead.lab.table import Table
+
+LAWS: Final = (("none", "operator"), ("swept", "operator"), ("swept", "robot"), ("paper", "robot"))
+_SAID: Final = {"none": "no haptics", "swept": "swept", "paper": "paper"}
+
+
+def approach(runs: Table) -> Lines:
+    """Yield a row for each scene, force and law; a column for each link: the gap, or the speed of the contact."""
+    links = list(dict.fromkeys(runs.values("link")))
+    yield "scene", "force, N", "law", *(link.split(" distribution")[0] for link in links)
+    for (model, force_n), those in runs.groups("model", "force_n"):
+        for law, compensation in LAWS:
+            mine = Table(row for row in those.where(law=law) if law == "none" or row["compensation"] == compensation)
+            said = f"{_SAID[law]}, v t_d" if (law, compensation) == ("swept", "robot") else _SAID[law]
+            if len(mine):
+                yield Path(model).stem, f"{force_n:g}", said, *(_ends(mine.where(link=link)) for link in links)
+
+
+def _ends(runs: Table) -> str:
+    """Return the middle gap at the end, in mm, and the middle speed of those that touch."""
+    gaps_mm, speeds_mm_s = runs.values("stops_at_mm"), runs.values("contact_speed_mm_s")
+    parts = [f"{median(gaps_mm):.1f}"] if gaps_mm else []
+    parts += [f"hits at {median(speeds_mm_s):.0f}" if not gaps_mm else f"{len(speeds_mm_s)} hit"] if speeds_mm_s else []
+    return ", ".join(parts)
+
+
+def error(predictions: Table) -> Lines:
+    """Yield a row for each link: of both predictions, the standard deviation and the worst pull's 99 % quantile."""
+    yield "link", "loop age, ms", "v t_d (eq. 8), mm", "the operator's own commands, mm"
+    for (link,), those in predictions.groups("link"):
+        yield link or "none", f"{fmean(those.values('robot_loop_age_ms')):.0f}", *_missed(those)
+
+
+def _missed(of_link: Table) -> Iterator[str]:
+    for kind in reversed(COMPENSATIONS):
+        spreads = Table(row for row in of_link if row[f"{kind}_sd_mm"] is not None)
+        squares = [row[f"{kind}_mean_mm"] ** 2 + row[f"{kind}_sd_mm"] ** 2 for row in spreads]
+        yield f"{sqrt(fmean(squares)):.1f}, {max(of_link.values(f'{kind}_p99_mm')):.1f}"
