@@ -6,7 +6,7 @@ from feelahead.lab.approaches.evaluation import LINKS
 from feelahead.lab.approaches.pulls import PULL_KINDS
 from feelahead.lab.measurements.lines import Lines
 from feelahead.lab.questions import coverage as question
-from feelahead.lab.table import Table
+from feelahead.lab.table import Row, Table
 
 
 def coverage(cells: Table) -> Lines:
@@ -90,8 +90,10 @@ def other_errors(cells: Table) -> Lines:
 
 def _seen(cells: Table, seen_by: str) -> str:
     """Return coverage and false alarms a minute; bold with its interval's lower end where the cell does not hold."""
-    entries = []
-    for row in cells.where(seen_by=seen_by):
-        covered = f"{row['coverage']:.2f}" if row["holds"] else f"**{row['coverage']:.2f} [{row['low']:.2f}]**"
-        entries.append(f"{covered}, {row['alarms_per_min']:.0f}")
-    return " ".join(entries)
+    return " ".join(f"{_share(row)}, {row['alarms_per_min']:.0f}" for row in cells.where(seen_by=seen_by))
+
+
+def _share(row: Row) -> str:
+    if row["coverage"] is None:
+        return "nothing ahead"
+    return f"{row['coverage']:.2f}" if row["holds"] else f"**{row['coverage']:.2f} [{row['low']:.2f}]**"
