@@ -4,18 +4,14 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-import numpy as np
-
 from common.errors import ConfigurationError
 from robot_side.depth.recorded.cloud import Cloud
-from robot_side.depth.recorded.cloud_files import coordinates
+from robot_side.depth.recorded.ros_messages import cloud_of
 
 if TYPE_CHECKING:
     from rosbags.highlevel import AnyReader
 
 _KIND: Final = "sensor_msgs/msg/PointCloud2"
-_TYPES: Final = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 8: "f8"}
-"""NumPy's types by PointField's numbers"""
 
 
 def bag_clouds(path: Path, topic: str | None = None) -> Iterator[tuple[float, Cloud]]:
@@ -43,22 +39,4 @@ def _clouds(reader: "AnyReader", path: Path, topic: str | None) -> Iterator[tupl
     for connection, _, payload in reader.messages([one for one in reader.connections if one.topic == chosen]):
         message: Any = reader.deserialize(payload, connection.msgtype)
         stamp = message.header.stamp
-        yield stamp.sec + 1e-9 * stamp.nanosec, _cloud(message, f"{path}: {chosen}")
-
-
-def _cloud(message: Any, where: str) -> Cloud:
-    fields = {one.name: one for one in message.fields}
-    order = ">" if message.is_bigendian else "<"
-    try:
-        formats = [order + _TYPES[fields[name].datatype] for name in "xyz"]
-        offsets = [fields[name].offset for name in "xyz"]
-        point = np.dtype(
-            {"names": ["x", "y", "z"], "formats": formats, "offsets": offsets, "itemsize": message.point_step}
-        )
-        rows = np.asarray(message.data).reshape(message.height, message.row_step)
-    except (KeyError, ValueError) as error:
-        raise ConfigurationError(f"{where}: fields, point_step or row_step: {error}; valid: x, y, z") from error
-    # A row may end with padding.
-    used = np.ascontiguousarray(rows[:, : message.width * message.point_step])
-    shape = (message.height, message.width) if message.height > 1 else None
-    return Cloud(coordinates(used.reshape(-1).view(point)), shape)
+        yield stamp.sec + 1e-9 * stamp.nanosec, cloud_of(message, f"{path}: {chosen}")

@@ -2,12 +2,15 @@
 
 import math
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
+import numpy.typing as npt
 
 from common.arrays import FloatArray, IntArray
 from robot_side.depth.picture import CameraPose, DepthArray, Pinhole
 
+COORDINATES: Final = ("x", "y", "z")
 _WHOLE_PX = 0.1
 """Largest distance of an organised cloud's points from their pixels' rays, for which they are a pinhole's picture"""
 
@@ -17,7 +20,7 @@ class Cloud:
     """Points that a sensor measured, row by row where its file says so."""
 
     points_m: FloatArray
-    """(n, 3) points in the file's frame; NaN where nothing was measured"""
+    """(n, 3) points in the file's frame; not finite where nothing was measured"""
     shape: tuple[int, int] | None = None
     """Rows and columns (h, w) of an organised cloud; None: its points are in no order"""
     sensor: CameraPose | None = None
@@ -40,6 +43,12 @@ class VirtualCamera:
         return Pinhole(focal_px, focal_px, 0.5 * self.width, 0.5 * self.height)
 
 
+def coordinates(records: "npt.NDArray[np.void]") -> FloatArray:
+    """Return the fields x, y, z (n, 3) of records (n,)."""
+    points_m: FloatArray = np.stack([records[name].reshape(-1) for name in COORDINATES], axis=-1).astype(np.float64)
+    return points_m
+
+
 def depth_of(cloud: Cloud, camera: VirtualCamera) -> tuple[DepthArray, Pinhole]:
     """Return the depth (h, w) that the cloud's sensor saw, and its intrinsics.
 
@@ -48,8 +57,7 @@ def depth_of(cloud: Cloud, camera: VirtualCamera) -> tuple[DepthArray, Pinhole]:
     seen_m = cloud.points_m
     if (sensor := cloud.sensor) is not None:
         seen_m = (seen_m - sensor.position_m) @ sensor.rotation
-    # NaN is not ahead, either.
-    ahead = np.flatnonzero(seen_m[:, 2] > 0.0)
+    ahead = np.flatnonzero((seen_m[:, 2] > 0.0) & np.isfinite(seen_m).all(axis=1))
     depth_m = seen_m[ahead, 2]
     right, down = seen_m[ahead, 0] / depth_m, seen_m[ahead, 1] / depth_m
     if cloud.shape is not None:
@@ -72,7 +80,7 @@ def _fitted(right: FloatArray, down: FloatArray, rows: IntArray, columns: IntArr
     found: list[float] = []
     for slope, pixels in ((right, columns), (down, rows)):
         terms = np.stack([slope, np.ones_like(slope)], axis=1)
-        focal_px, center_px = np.linalg.lstsq(terms, pixels + 0.5, rcond=None)[0]
+        focal_px, center_px = np.linalg.lstsq(terms.T @ terms, terms.T @ (pixels + 0.5), rcond=None)[0]
         if not (focal_px > 0.0 and np.abs(terms @ (focal_px, center_px) - pixels - 0.5).max() < _WHOLE_PX):
             return None
         found += [float(focal_px), float(center_px)]

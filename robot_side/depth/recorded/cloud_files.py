@@ -5,13 +5,12 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
 from common.arrays import FloatArray
 from common.errors import ConfigurationError
 from robot_side.depth.picture import CameraPose
-from robot_side.depth.recorded.cloud import Cloud
+from robot_side.depth.recorded.cloud import COORDINATES, Cloud, coordinates
 
 _Part = tuple[str, str, int]
 """Field of each point: name, NumPy's type, and how many numbers"""
@@ -23,7 +22,6 @@ _PLY_TYPES: Final = {
 }
 _PCD_TYPES: Final = {kind.upper() + size: kind + size for kind, sizes in _PCD_SIZES.items() for size in sizes}
 _LONGEST_HEADER: Final = 65536
-_COORDINATES: Final = ("x", "y", "z")
 
 
 def read_pcd(path: Path) -> Cloud:
@@ -71,12 +69,6 @@ def read_ply(path: Path) -> Cloud:
     return Cloud(_points(path, parts, content, count, text=form == "ascii"))
 
 
-def coordinates(records: "npt.NDArray[np.void]") -> FloatArray:
-    """Return the fields x, y, z (n, 3) of records (n,)."""
-    points_m: FloatArray = np.stack([records[name].reshape(-1) for name in _COORDINATES], axis=-1).astype(np.float64)
-    return points_m
-
-
 def _split(path: Path, ends: bytes) -> tuple[list[str], bytes]:
     """Return the lines of the header, up to the one that begins with `ends`, and what follows."""
     try:
@@ -92,11 +84,11 @@ def _split(path: Path, ends: bytes) -> tuple[list[str], bytes]:
 def _points(path: Path, parts: Sequence[_Part], content: bytes, count: int, *, text: bool) -> FloatArray:
     """Return `count` points (n, 3) of a file whose points have these fields."""
     names = [name for name, _, _ in parts]
-    once = all([number for name, _, number in parts if name == wanted] == [1] for wanted in _COORDINATES)
+    once = all([number for name, _, number in parts if name == wanted] == [1] for wanted in COORDINATES)
     _require(once, path, f"fields = {', '.join(names)}", "x, y and z, each once")
     if not text:
         # Other fields, as padding, may share a name.
-        own = [name if name in _COORDINATES else f"{k}" for k, name in enumerate(names)]
+        own = [name if name in COORDINATES else f"{k}" for k, name in enumerate(names)]
         fields = zip(own, parts, strict=True)
         dtype = np.dtype([(name, f"<{kind}", (number,)) for name, (_, kind, number) in fields])
         size = dtype.itemsize * count
@@ -106,7 +98,7 @@ def _points(path: Path, parts: Sequence[_Part], content: bytes, count: int, *, t
     # Other elements may follow the points.
     words = content.split(None, count * columns[-1])[: count * columns[-1]]
     _require(len(words) == count * columns[-1], path, f"{len(words)} numbers of points", f"{count * columns[-1]}")
-    wanted = [columns[names.index(name)] for name in _COORDINATES]
+    wanted = [columns[names.index(name)] for name in COORDINATES]
     return _numbers(path, "x, y, z", [words[column :: columns[-1]] for column in wanted]).T
 
 
