@@ -88,7 +88,7 @@ class FakeSocket:
         """Return the oldest message that waits."""
         return bytes(msgpack.packb(self.waiting.pop(0)))
 
-    def send(self, payload: bytes) -> None:
+    def send(self, payload: bytes, _: int = 0) -> None:
         """Keep a message."""
         self.sent.append(msgpack.unpackb(payload))
 
