@@ -9,9 +9,9 @@ from typing import Final
 import numpy as np
 
 from common.arrays import FloatArray
-from feelahead.lab.figures import figure
 from feelahead.lab.posed_gripper import PosedGripper
 from feelahead.lab.table import Row, Table
+from feelahead.printing.pictures import figure
 from robot_side.drivers.mujoco.gripper_measurement import open_gap
 from robot_side.drivers.mujoco.hand.gripper_cover import cover_gripper, link_solids, placed_corners
 from robot_side.drivers.mujoco.scene import load_scene

@@ -19,7 +19,7 @@ from common.protocol.view_messages import VIEW_NAMES
 from common.roles import Role
 from feelahead.both_sides.against_distance import draw_courses, strength_against_distance
 from feelahead.both_sides.episode import Episode
-from feelahead.lab.figures import figure
+from feelahead.printing.pictures import figure
 from feelahead.printing.progress import progress
 from robot_side.drivers.mujoco.hand.gripper_cover import placed_corners
 from robot_side.overlap import sphere_box

@@ -14,10 +14,11 @@ import numpy as np
 
 from common.command.stop_signal import StopSignal
 from common.errors import ConfigurationError, FeelaheadError
-from feelahead.lab.executors import cluster, processes
+from feelahead.lab.cluster import cluster
 from feelahead.lab.scheduler import Scheduler
 from feelahead.lab.table import Row
 from feelahead.printing.progress import Shown
+from feelahead.workers import processes
 
 _WORKERS = 2
 _LOOK_S = 0.2

@@ -14,7 +14,7 @@ from msgspec import Meta
 
 from common.command.command_line import parse_settings
 from common.limits import check_limits
-from feelahead.lab.figures import figure
+from feelahead.printing.pictures import figure
 from robot_side.drivers.mujoco.built_in_scenes import SceneName
 from robot_side.drivers.mujoco.hand.gripper_cover import placed_corners
 from robot_side.drivers.mujoco.scene import load_scene

@@ -25,12 +25,12 @@ from common.errors import ConfigurationError, FeelaheadError
 from common.files.output_file import require_output_file, write_json
 from common.limits import check_limits
 from common.recording.provenance import provenance
-from feelahead.lab.figures import PICTURES
 from feelahead.lab.goals import Goal, show_goals
 from feelahead.lab.journal import Journal
 from feelahead.lab.pieces import Piece, results
 from feelahead.lab.scheduler import Scheduler
 from feelahead.lab.table import Row, Table
+from feelahead.printing.pictures import PICTURES
 from feelahead.printing.progress import progress
 
 _ROOT = Path(__file__).parents[2]

@@ -1,1 +1,1 @@
-"""Progress of long work and tables of figures, as they are printed."""
+"""Progress of long work, tables of figures, and pictures."""

@@ -147,15 +147,17 @@ ARROWS = """
     feelahead/both_sides: common/* robot_side/* operator_side/*
     feelahead/recordings: common/* robot_side/* operator_side/*
     feelahead/containers: common/* feelahead/both_sides
-    feelahead/printing: common
+    feelahead/workers.py: common
+    feelahead/printing: common common/recording
     feelahead/lab: common/* robot_side/* operator_side/* feelahead/both_sides feelahead/containers feelahead/printing
-    feelahead/study/report: common common/files common/recording feelahead/lab feelahead/printing feelahead/study
+        feelahead/workers.py
+    feelahead/study/report: common common/files common/recording feelahead/printing feelahead/study
         feelahead/study/trials
     feelahead/study: common common/command common/files robot_side/drivers/mujoco robot_side/laws/named.py
     feelahead/commands/bench_and_try.py: common common/files feelahead/lab
     feelahead/study/trials: common common/recording robot_side/laws/paper_settings.py robot_side/settings.py
-        operator_side operator_side/people operator_side/settings.py feelahead/both_sides feelahead/lab
-        feelahead/printing feelahead/study
+        operator_side operator_side/people operator_side/settings.py feelahead/both_sides
+        feelahead/printing feelahead/study feelahead/workers.py
     feelahead/commands/study: common common/command common/recording common/status operator_side/viewing/console
         feelahead/both_sides feelahead/commands/demo feelahead/printing feelahead/study feelahead/study/report
         feelahead/study/trials

@@ -7,8 +7,8 @@ from typing import Any, Final
 import numpy as np
 
 from feelahead.lab.accuracy import displacement, onset, pose, volume
-from feelahead.lab.figures import figure
 from feelahead.lab.table import Row, Table
+from feelahead.printing.pictures import figure
 
 PANELS: Final = (
     ("contact distance, mm", onset.UNIT, "contact"),

@@ -8,8 +8,8 @@ from typing import Any, Final
 from feelahead.lab.approaches.frozen import scene_names
 from feelahead.lab.approaches.laws import TriedLaw, in_words, with_compensation
 from feelahead.lab.approaches.links import mean_loop_s
-from feelahead.lab.figures import colour_of, figure
 from feelahead.lab.table import Row, Table
+from feelahead.printing.pictures import colour_of, figure
 from robot_side.laws.paper_settings import PaperSettings
 
 _LARGEST_MARK, _SMALLER = 10.0, 2.0

@@ -20,10 +20,10 @@ from feelahead.lab.approaches.evaluation import LINKS, Placement, Pulls, evaluat
 from feelahead.lab.approaches.frozen import frozen_hash
 from feelahead.lab.approaches.laws import TriedLaw, is_paper, require_tried
 from feelahead.lab.approaches.pulls import PULL_KINDS, PullKind
-from feelahead.lab.figures import colour_of, figure
 from feelahead.lab.sweep import Question, Sweep
 from feelahead.lab.table import Row, Table
 from feelahead.printing.figures import shown
+from feelahead.printing.pictures import colour_of, figure
 from robot_side.depth.camera_settings import Perception
 from robot_side.laws.paper_settings import PaperFlags
 

@@ -26,11 +26,11 @@ from feelahead.lab.approaches.prediction import (
 )
 from feelahead.lab.approaches.pulls import PULL_KINDS, PullKind
 from feelahead.lab.approaches.recording import record_approach
-from feelahead.lab.figures import figure
 from feelahead.lab.posed_gripper import PosedGripper
 from feelahead.lab.sweep import Question, Sweep
 from feelahead.lab.table import Row, Table
 from feelahead.printing.figures import shown
+from feelahead.printing.pictures import figure
 from robot_side.arm.limits import ArmLimits
 from robot_side.arm.tool_motion import ToolMotionSettings
 from robot_side.drivers.mujoco.scene import load_scene

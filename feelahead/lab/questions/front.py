@@ -22,10 +22,10 @@ from feelahead.lab.approaches.evaluation import LINKS, Placement, Pulls, evaluat
 from feelahead.lab.approaches.frozen import frozen_hash, frozen_scene
 from feelahead.lab.approaches.laws import TriedLaw, paper_figures, with_papers
 from feelahead.lab.approaches.pulls import PullKind
-from feelahead.lab.figures import colour_of, figure
 from feelahead.lab.sweep import Question, Sweep
 from feelahead.lab.table import Row, Table
 from feelahead.printing.figures import shown
+from feelahead.printing.pictures import colour_of, figure
 from robot_side.laws.paper_settings import EnlargementTime, PaperSettings, Share
 
 LAWS: Final = ("paper", "paper-isotropic", "swept", "none")

@@ -29,11 +29,11 @@ from feelahead.both_sides.summary import merge_summaries
 from feelahead.both_sides.trial import Trial, figures_of
 from feelahead.containers.medium import ContainerMedium
 from feelahead.lab.approaches.links import require_young_loop
-from feelahead.lab.figures import figure
 from feelahead.lab.intervals import student_interval, welch_interval
 from feelahead.lab.sweep import Question, Sweep
 from feelahead.lab.table import Row, Table
 from feelahead.printing.figures import shown
+from feelahead.printing.pictures import figure
 from operator_side.people.arming_hands import constant_force
 from operator_side.settings import OperatorSettings
 from robot_side.settings import RobotSettings

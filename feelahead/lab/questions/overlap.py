@@ -18,7 +18,6 @@ from rich.table import Table as Shown
 from common.arrays import FloatArray
 from common.clock import MonotonicClock
 from common.files.input_file import require_input_file
-from feelahead.lab.figures import figure
 from feelahead.lab.goals import Goal
 from feelahead.lab.interleaved import interleaved, least_ns
 from feelahead.lab.reference import errors
@@ -31,6 +30,7 @@ from feelahead.lab.reference.published import SDIST, CompiledHeader, PythonPacka
 from feelahead.lab.sweep import Question, Sweep
 from feelahead.lab.table import Row, Table
 from feelahead.printing.figures import shown
+from feelahead.printing.pictures import figure
 from robot_side.overlap import Mesh, sphere_box, sphere_tetrahedron
 
 OURS, KERNEL, PACKAGE, HEADER = "ours, checked", "ours, kernel", "overlap, Python", "overlap, C++"

@@ -10,8 +10,8 @@ from common.arrays import FloatArray
 from feelahead.lab.approaches.approach import Approach, PullRun
 from feelahead.lab.approaches.frozen import frozen_scene
 from feelahead.lab.approaches.outcome import Trace, reversals, stands
-from feelahead.lab.figures import figure
 from feelahead.lab.table import Row, Table
+from feelahead.printing.pictures import figure
 from operator_side.controller.feel import MAX_STRENGTH
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
 

@@ -8,7 +8,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from feelahead.lab.figures import figure
+from feelahead.printing.pictures import figure
 from feelahead.study.protocol import Protocol
 from feelahead.study.report.contrasts import Compared, pairs_of
 from feelahead.study.report.outcomes import OUTCOMES, Kind, Outcome, Tables, measured, outcome_of

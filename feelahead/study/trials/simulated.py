@@ -12,7 +12,6 @@ from typing import Final
 
 from feelahead.both_sides.episode import Episode
 from feelahead.both_sides.episode_hands import GRASPING
-from feelahead.lab.executors import processes
 from feelahead.printing.progress import progress
 from feelahead.study.events import Answered, Begun, Consented, Ended, Enrolled, Event, Rested, Resumed
 from feelahead.study.folder import TRIALS, Study
@@ -23,6 +22,7 @@ from feelahead.study.steps import Consent, Enrol, Pause, Practice, Questions, Re
 from feelahead.study.trials.outcome import Outcome, outcome_of
 from feelahead.study.trials.participants import Participant
 from feelahead.study.trials.sides import side_values
+from feelahead.workers import processes
 from operator_side.people.settings import PersonSettings
 from operator_side.settings import OperatorSettings
 from robot_side.settings import RobotSettings

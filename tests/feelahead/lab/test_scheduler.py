@@ -56,7 +56,7 @@ def test_a_cluster_over_tls_admits_who_has_a_certificate_of_its_authority_only(
         assert ask(QUESTION, ["--scheduler", address, *_pem(certificates), "--csv", str(there)]) == 0
         assert there.read_bytes() == here.read_bytes()
         assert capsys.readouterr().err == ""
-        monkeypatch.setattr("feelahead.lab.executors._CONNECT_S", "2s")
+        monkeypatch.setattr("feelahead.lab.cluster._CONNECT_S", "2s")
         for refused in (
             [address, *_pem(certificates, own="other/own")],
             [address, *_pem(certificates, ca="other/ca.pem")],

@@ -341,7 +341,7 @@ def test_whatever_is_killed_costs_no_row_and_a_file_of_ones_own_runs_on_a_cluste
 
 @pytest.mark.processes
 def test_a_scheduler_that_is_not_there_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("feelahead.lab.executors._CONNECT_S", "1s")
+    monkeypatch.setattr("feelahead.lab.cluster._CONNECT_S", "1s")
     with pytest.raises(ConfigurationError, match=r"--scheduler tcp://127\.0\.0\.1:1: no dask scheduler answers there"):
         ask(QUESTION, ["--scheduler", "tcp://127.0.0.1:1"])
 

@@ -13,11 +13,11 @@ from feelahead.lab.approaches.approach import Approach, robot_settings
 from feelahead.lab.approaches.frozen import AHEAD, ASIDE, frozen_hash
 from feelahead.lab.approaches.laws import LAWS
 from feelahead.lab.approaches.outcome import End, Outcome, Trace
-from feelahead.lab.figures import LAW_COLOURS
 from feelahead.lab.questions import approach as module
 from feelahead.lab.questions import haptics
 from feelahead.lab.questions.approach import QUESTION, figures
 from feelahead.lab.sweep import ask
+from feelahead.printing.pictures import LAW_COLOURS
 from robot_side.laws.paper_settings import PaperSettings
 from tests.helpers.refusal import refusal
 from tests.helpers.repository import DATA

@@ -1,16 +1,8 @@
-"""Run cells in several processes of this machine, or on a cluster of dask.distributed, through one interface.
-
-Both yield an executor of concurrent.futures. They raise FeelaheadError if a process or the whole cluster is gone.
-"""
+"""Cluster of dask.distributed, as an executor of concurrent.futures."""
 
 import logging
-import multiprocessing
-import os
-import signal
-import threading
 from collections.abc import Iterator
-from concurrent.futures import CancelledError, Executor, ProcessPoolExecutor
-from concurrent.futures.process import BrokenProcessPool
+from concurrent.futures import CancelledError, Executor
 from contextlib import contextmanager
 from typing import Any, cast
 
@@ -18,31 +10,7 @@ from common.errors import ConfigurationError, FeelaheadError
 from common.recording.packages import require_packages
 from feelahead.lab.scheduler import Scheduler
 
-_LOOK_S = 1.0
 _CONNECT_S = "10s"
-
-
-@contextmanager
-def processes(workers: int) -> Iterator[Executor]:
-    """Yield a pool of `workers` processes on this machine; they end when this process ends, even by kill -9."""
-    pool = ProcessPoolExecutor(workers, multiprocessing.get_context("spawn"), _end_with_parent, (os.getpid(),))
-    try:
-        # The workers inherit that SIGINT is ignored: only this process reacts to Ctrl-C.
-        before = signal.signal(signal.SIGINT, signal.SIG_IGN)
-        try:
-            for _ in range(workers):  # each starts one, as none is idle yet
-                pool.submit(os.getpid)
-        finally:
-            signal.signal(signal.SIGINT, before)
-        yield pool
-    except BaseException as error:
-        for child in multiprocessing.active_children():
-            child.terminate()
-        if isinstance(error, BrokenProcessPool):
-            raise FeelaheadError("a worker process ended unexpectedly (killed, or out of memory)") from error
-        raise
-    finally:
-        pool.shutdown(cancel_futures=True)
 
 
 @contextmanager
@@ -80,15 +48,3 @@ def cluster(scheduler: Scheduler, own_file: str | None) -> Iterator[Executor]:
         raise FeelaheadError(f"--scheduler {address}: the scheduler or its workers are gone") from error
     finally:
         client.close(timeout=1)
-
-
-def _end_with_parent(parent: int) -> None:
-    """Start a thread that ends this worker within a second after its parent process is gone."""
-
-    def watch() -> None:
-        never = threading.Event()
-        while os.getppid() == parent:
-            never.wait(_LOOK_S)
-        os._exit(1)
-
-    threading.Thread(target=watch, daemon=True).start()
