@@ -1,8 +1,8 @@
 """Source of the depth that a camera under ROS 2 publishes (rclpy), in your own ROS environment with pyzmq and msgpack.
 
 Usage: PYTHONPATH=. python docs/drivers/ros2_depth.py image|cloud TOPIC [NAME=VALUE ...], in feelahead's clone. Names:
-address; camera, its name; info, the topic of its CameraInfo; rectified=yes: P counts, not K and D; latency_s, from
-exposure until a message is here, for stamps of another clock. A cloud, PointCloud2, has z ahead.
+address; camera; info, the topic with CameraInfo; rectified=yes: P counts, not K and D; latency_s, from exposure until a
+message is here, for stamps of another clock. A cloud, PointCloud2, has z ahead.
 """
 
 import contextlib

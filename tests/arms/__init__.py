@@ -1,1 +1,1 @@
-"""Drivers of real arms against their real peers: `make test-arms`, and the table of `python -m tests.arms.table`."""
+"""Drivers of real arms and of depth with their real peers: `make test-arms`, and `python -m tests.arms.table`."""

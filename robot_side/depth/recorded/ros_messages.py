@@ -38,7 +38,7 @@ def depth_of_image(image: Any) -> DepthArray:
 def pinhole_of(info: Any, image: Any, rectified: bool = False) -> Pinhole:
     """Return the intrinsics of an Image by its CameraInfo.
 
-    rectified: whether the image has no distortion more, whatever D says; then P holds its intrinsics, and K does not.
+    rectified: the image has no distortion, whatever D says. P counts then, and K does not.
     """
     if (info.width, info.height) != (image.width, image.height):
         raise ConfigurationError(
