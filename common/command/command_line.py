@@ -25,6 +25,7 @@ from common.files.toml_file import read_toml
 Settings = TypeVar("Settings")
 
 _LONGEST_COMPLAINT = 400
+_COLOURS = re.compile(r"\x1b\[[0-9;]*m")
 _NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 """Errors of the system when standard output is a file that cannot grow."""
 _LARGEST_CONFIG_BYTES = 1_000_000
@@ -207,9 +208,9 @@ def _tables(place: str, value: Any, hint: Any) -> Iterator[tuple[str, Mapping[st
 
 
 def _one_line(box: str, program: str, settings_type: type) -> str:
-    """Return the first paragraph of tyro's error as one line; its box may be drawn in ASCII."""
+    """Return the first paragraph of tyro's error as one line; its box may be drawn in ASCII, and in colours."""
     words: list[str] = []
-    for line in box.splitlines()[1:]:
+    for line in _COLOURS.sub("", box).splitlines()[1:]:
         text = line.strip("│╭╮╰╯|+ \t")
         ruled = text.strip("─-") == ""
         if words and (ruled or text == "Got errors:"):

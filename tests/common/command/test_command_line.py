@@ -1,3 +1,4 @@
+import sys
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated
@@ -60,10 +61,17 @@ def test_flags_win_over_the_file_which_wins_over_defaults(tmp_path: Path) -> Non
         (["--summary", "no/such/folder/out.json"], "no/such/folder"),
     ],
 )
-def test_bad_flags_become_one_line_that_names_them(arguments: list[str], named: str) -> None:
+@pytest.mark.parametrize("terminal", [False, True])
+def test_bad_flags_become_one_line_that_names_them(
+    arguments: list[str], named: str, terminal: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sys.stdout, "isatty", lambda: terminal)  # as tyro looks there before it writes in colours
+    monkeypatch.setenv("TERM", "xterm")
     text = refusal(parse, *arguments)
     assert named in text
+    assert text.isprintable()
     assert "│" not in text
+    assert "[0m" not in text
 
 
 @pytest.mark.parametrize(
