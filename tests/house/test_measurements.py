@@ -97,11 +97,15 @@ def test_a_cell_by_depth_that_does_not_hold_is_bold_with_its_lower_end() -> None
 
 
 def test_an_approach_that_touches_in_one_of_two_runs_says_so() -> None:
-    run = {"model": "tests/data/ball.xml", "force_n": 2.0, "link": "delay 0ms", "compensation": "operator"}
-    stops, touches = {"stops_at_mm": 7.0, "contact_speed_mm_s": None}, {"stops_at_mm": None, "contact_speed_mm_s": 72.0}
-    runs = [run | {"law": "swept"} | stops, run | {"law": "swept"} | touches, run | {"law": "none"} | touches]
-    _, *lines = map(list, approaches.approach(Table(runs)))
-    assert lines == [["ball", "2", "no haptics", "hits at 72"], ["ball", "2", "swept", "7.0, 1 hit"]]
+    run = {"model": "tests/data/ball.xml", "force_n": 2.0, "compensation": "operator"}
+    near, far = {"link": "delay 0ms"}, {"link": "delay 50ms"}
+    stops = {"stops_at_mm": 7.0, "contact_speed_mm_s": None, "end": "stopped"}
+    touches = {"stops_at_mm": None, "contact_speed_mm_s": 72.0, "end": "contact"}
+    moves = {"stops_at_mm": None, "contact_speed_mm_s": None, "end": "undecided"}
+    swept = [run | {"law": "swept"} | of for of in (near | stops, near | touches, far | stops, far | moves)]
+    none = [run | {"law": "none"} | touches | link for link in (near, far)]
+    _, *lines = map(list, approaches.approach(Table([*swept, *none])))
+    assert lines == [["ball", "2", "hits at 72", "7.0, 1 hit / 7.0, 1 undecided", "", ""]]
 
 
 def test_hits_of_a_study_are_counted_over_its_delays() -> None:

@@ -10,28 +10,35 @@ from feelahead.lab.approaches.prediction import COMPENSATIONS
 from feelahead.lab.measurements.lines import Lines
 from feelahead.lab.table import Table
 
-LAWS: Final = (("none", "operator"), ("swept", "operator"), ("swept", "robot"), ("paper", "robot"))
-_SAID: Final = {"none": "no haptics", "swept": "swept", "paper": "paper"}
+_LAWS: Final = {
+    "no haptics": ("none", "operator"),
+    "swept": ("swept", "operator"),
+    "swept, v t_d": ("swept", "robot"),
+    "paper": ("paper", "robot"),
+}
+"""Law and compensation by the column's heading"""
 
 
 def approach(runs: Table) -> Lines:
-    """Yield a row for each scene, force and law; a column for each link: the gap, or the speed of the contact."""
-    links = list(dict.fromkeys(runs.values("link")))
-    yield "scene", "force, N", "law", *(link.split(" distribution")[0] for link in links)
+    """Yield a row for each scene and force, a column for each law: over the links, the gap or the contact's speed."""
+    yield "scene", "force, N", *_LAWS
     for (model, force_n), those in runs.groups("model", "force_n"):
-        for law, compensation in LAWS:
-            mine = Table(row for row in those.where(law=law) if law == "none" or row["compensation"] == compensation)
-            said = f"{_SAID[law]}, v t_d" if (law, compensation) == ("swept", "robot") else _SAID[law]
-            if len(mine):
-                yield Path(model).stem, f"{force_n:g}", said, *(_ends(mine.where(link=link)) for link in links)
+        yield Path(model).stem, f"{force_n:g}", *(_over_links(those, *of) for of in _LAWS.values())
+
+
+def _over_links(runs: Table, law: str, compensation: str) -> str:
+    mine = Table(row for row in runs.where(law=law) if law == "none" or row["compensation"] == compensation)
+    ends = [_ends(of_link) for _, of_link in mine.groups("link")]
+    return ends[0] if ends and len({*ends}) == 1 else " / ".join(ends)
 
 
 def _ends(runs: Table) -> str:
-    """Return the middle gap at the end, in mm, and the middle speed of those that touch."""
+    """Return the middle gap at the end, in mm, the middle speed of those that touch, and how many still moved."""
     gaps_mm, speeds_mm_s = runs.values("stops_at_mm"), runs.values("contact_speed_mm_s")
     parts = [f"{median(gaps_mm):.1f}"] if gaps_mm else []
     parts += [f"hits at {median(speeds_mm_s):.0f}" if not gaps_mm else f"{len(speeds_mm_s)} hit"] if speeds_mm_s else []
-    return ", ".join(parts)
+    undecided = sum(row["end"] == "undecided" for row in runs)
+    return ", ".join(parts + ([f"{undecided} undecided"] if undecided else []))
 
 
 def error(predictions: Table) -> Lines:
