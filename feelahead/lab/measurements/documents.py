@@ -21,7 +21,7 @@ FIGURES: Final = ROOT / "figures"
 MARKED: Final = re.compile(
     r"(<!-- (?P<name>(?P<file>\w+)[^\n]*?): by make figures -->\n).*?(?P<end><!-- end -->)", re.DOTALL
 )
-_NAMES: Final = ("case",)
+_NAMES: Final = ("case", "setting")
 _PLAIN: Final = {"": None, "True": True, "False": False}
 
 
@@ -48,8 +48,11 @@ def written(text: str, figures: Path = FIGURES) -> str:
     def anew(found: re.Match[str]) -> str:
         if not (figures / f"{found['file']}.csv").exists():
             return found[0]
-        lines = [f"| {' | '.join(cells)} |" for cells in TABLES[found["name"]](read(found["file"], figures))]
-        lines.insert(1, "|---" * (lines[0].count("|") - 1) + "|")
+        rows = [
+            [cell.replace("|", "\\|") for cell in row] for row in TABLES[found["name"]](read(found["file"], figures))
+        ]
+        lines = [f"| {' | '.join(row)} |" for row in rows]
+        lines.insert(1, "|---" * len(rows[0]) + "|")
         return "\n".join([found[1] + f"Commit {commits[found['file']]}:\n", *lines, found["end"]])
 
     return MARKED.sub(anew, text)
@@ -62,6 +65,8 @@ TABLES: Final[dict[str, Callable[[Table], Lines]]] = {
     "definition": looks.definition,
     "tick": looks.tick,
     "cover": looks.cover,
+    "stability": looks.stability,
+    "tiles": looks.tiles,
     "approach": approaches.approach,
     "coverage": coverages.coverage,
     "coverage: alarms": coverages.alarms,

@@ -1,4 +1,7 @@
-"""Tables of what looks cost, of their error by definition, and of the spheres that cover grippers."""
+"""Tables of what looks cost, of errors, and of the spheres that cover grippers."""
+
+from math import isfinite
+from statistics import median
 
 from feelahead.lab.measurements.lines import Lines
 from feelahead.lab.table import Table
@@ -33,3 +36,32 @@ def cover(parts: Table) -> Lines:
         f"{sum(parts.values('spheres')):g}",
         *(short(max(parts.values(name))) for name in ("sticks_out_mm", "stands_out_mm")),
     )
+
+
+def stability(tallies: Table) -> Lines:
+    """Yield a row for each part and kind of error: its worst class. Cases without a limit have rows of their own."""
+    yield "part", "cases", "worst error", "limit", "NaN, infinity, exceptions", "error is"
+    tried = Table(row for row in tallies if row["measure"] is not None)
+    for (part, limit, measure), those in tried.groups("part", "limit", "measure"):
+        undefined = sum(those.values("undefined")) + sum(those.values("exceptions"))
+        worst = max(those, key=lambda row: float(row["error"]))
+        where = f"{short(worst['error'])} ({worst['case']})" if worst["error"] else "0"
+        allowed = short(limit) if isfinite(limit) else "none"
+        yield part, f"{sum(those.values('cases')):g}", where, allowed, f"{undefined:g}", measure
+
+
+def tiles(looks: Table) -> Lines:
+    """Yield a row for each size and roughness of tiles: how much later full strength begins, and the clearance."""
+    ahead, beside = looks.where(scene="ahead", gap_m=0.0), looks.where(scene="beside", camera_sd_m=1e-3)
+    angles, kinds = sorted(set(ahead.values("tilt_deg"))), ("each", "surface")
+    each = [(kind, tilt_deg) for kind in kinds for tilt_deg in angles]
+    yield "tiles", *(f"{kind}, at {tilt_deg:g}°" for kind, tilt_deg in each), "free from, mm: each / surface / whole"
+    for (tile_m, roughness_m), those in ahead.groups("tile_m", "roughness_m"):
+        later = [those.where(**{"as": kind}, tilt_deg=tilt_deg).values("o8_mm") for kind, tilt_deg in each]
+        clear = beside.where(tile_m=tile_m, roughness_m=roughness_m)
+        free = [row["free_mm"] for kind in kinds for row in clear.where(**{"as": kind})] + clear.values("true_free_mm")
+        yield (
+            f"{1e3 * tile_m:g} mm, ±{1e3 * roughness_m:g} mm",
+            *(f"{median(one):+.1f}" if one else "" for one in later),
+            " / ".join(f"{one:.2f}" for one in free[: len(kinds) + 1]),
+        )

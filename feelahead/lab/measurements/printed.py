@@ -44,7 +44,6 @@ def _present(rows: Table) -> Table:
 
 
 _OVERLAP: Final = Asked(overlap.QUESTION, overlap.OverlapSweep())
-_STABILITY: Final = Asked(stability.QUESTION, stability.StabilitySweep())
 TABLES: Final[dict[str, Callable[[Table], Lines]]] = {
     "tick: goals": Asked(tick.QUESTION, tick.TickSweep()).goals,
     "overlap": _OVERLAP.goals,
@@ -56,8 +55,8 @@ TABLES: Final[dict[str, Callable[[Table], Lines]]] = {
     "overlap: adversarial": _OVERLAP._replace(title="adversarial").table,
     "overlap: meshes": _OVERLAP._replace(title="a torus").table,
     "accuracy": Asked(accuracy.QUESTION, accuracy.AccuracySweep()).table,
-    "stability": _STABILITY._replace(title="parts").table,
-    "stability: closed loop": _STABILITY._replace(title="closed loop").table,
-    "tiles": Asked(felt.QUESTION, felt.FeltSweep(tiles=True)).table,
+    "stability: closed loop": lambda rows: Asked(stability.QUESTION, stability.StabilitySweep()).table(
+        rows.where(part=stability.CLOSED_LOOP)
+    ),
     "shared": Asked(felt.QUESTION, felt.FeltSweep(shared=True)).table,
 }
