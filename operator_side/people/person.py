@@ -110,8 +110,6 @@ class SimulatedOperator:
 
     def tick(self, now_s: float, screen: Telemetry | None, delay_s: float) -> None:
         """See the screen, and operate the controller. delay_s: round trip to which the person has adapted."""
-        if math.isnan(self._since_s):
-            self._since_s = now_s
         if screen is not None and (not self._seen or self._seen[-1][1] is not screen):
             self._seen.append((now_s, screen))
         while self._seen and self._seen[0][0] <= now_s - self._settings.visual_reaction_s:
@@ -119,17 +117,18 @@ class SimulatedOperator:
         self._feel(now_s)
         if now_s - self._marked_s > _PRESSES_S:
             self._fingers.also = frozenset()
-        if self._device.commanded.light == WARNING_LIGHT:
-            self._warned_s = now_s
-        if self._view is None or now_s - self._warned_s < _CALM_S:
+        view = None if now_s - self._warned_s < _CALM_S else self._view
+        if math.isnan(self._since_s) or (view is None and self.phase in (Doing.RESTING, Doing.ARMING)):
+            self._enter(Doing.RESTING, now_s)
+        if view is None:
             self._fingers.do(0.0, _REST)
             return
-        if self._view.state != "armed" and self.phase not in (Doing.RESTING, Doing.ARMING, Doing.DONE):
+        if view.state != "armed" and self.phase not in (Doing.RESTING, Doing.ARMING, Doing.DONE):
             self._enter(Doing.RESTING, now_s)
         lag_s = self._settings.visual_reaction_s + (delay_s if self._settings.adapts_to_delay else 0.0)
         # Crossover frequency in 1/s: as high as the delay in the loop allows, at most 4.5.
         gain = min(4.5, (math.pi / 2 - self._settings.phase_margin_rad) / lag_s) if lag_s > 0.0 else 4.5
-        getattr(self, f"_{self.phase}")(Glance(now_s, self._view, gain, lag_s))
+        getattr(self, f"_{self.phase}")(Glance(now_s, view, gain, lag_s))
 
     def _feel(self, now_s: float) -> None:
         """Feel the cues. One reaction after a cue the person goes gently until the next phase.
@@ -144,6 +143,7 @@ class SimulatedOperator:
         self._gently_along |= stiff
         self._gently_across |= rumbles
         seeing = self._device.commanded.light != WARNING_LIGHT
+        self._warned_s = self._warned_s if seeing else now_s
         self._stands |= self._pulse.acted_on(now_s, seeing and self._device.rumble.right > _HARD)
 
     def _enter(self, phase: Doing, now_s: float) -> None:
@@ -160,9 +160,9 @@ class SimulatedOperator:
         return glance.now_s - self._since_s
 
     def _resting(self, glance: Glance) -> None:
-        """Keep all inputs at rest for the second that arming requires."""
+        """Keep all inputs at rest for the second that arming requires, once the screen shows something."""
         self._fingers.do(0.0, _REST)
-        if self._elapsed_s(glance) > 1.2 + self._settings.visual_reaction_s:
+        if self._elapsed_s(glance) > 1.2:
             self._enter(Doing.ARMING, glance.now_s)
 
     def _arming(self, glance: Glance) -> None:

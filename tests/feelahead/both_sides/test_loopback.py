@@ -77,7 +77,10 @@ def _episode(delay_ms: int, compensation: Compensation) -> Episode:
 @episodes
 @pytest.mark.parametrize(("delay_ms", "compensation"), [(0, "operator"), (200, "operator"), (0, "robot")])
 def test_the_target_is_reached_grasped_and_lifted(delay_ms: int, compensation: Compensation) -> None:
-    summary = episode(delay_ms, compensation).summary
+    made = episode(delay_ms, compensation)
+    phases = [phase for phase, _ in itertools.groupby(moment.phase for moment in made.moments)]
+    assert phases[:3] == [Doing.RESTING, Doing.ARMING, Doing.ADVANCING]  # the first press arms
+    summary = made.summary
     assert summary["task"]["time_to_grasp_s"] is not None
     assert summary["task"]["lifted_mm"] > 50.0
     assert summary["task"]["contacts_by_object"]["target"] >= 1

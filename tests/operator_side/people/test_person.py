@@ -72,11 +72,11 @@ def stick_speed_m_s(hands: PersonInput) -> float:
 
 def test_the_task_from_waiting_to_withdrawing() -> None:
     desk = Desk(start_s=1e6)
-    for hands in desk.watch(None, 0.5):
+    for hands in desk.watch(None, 3.0):
         assert (hands.l2_n, hands.r2_n, hands.left, hands.buttons) == (0.0, 0.0, (0.0, 0.0), frozenset({Button.L1}))
         assert hands.phase == Doing.RESTING
-    # The person sees the first telemetry one reaction late, and arming requires inputs at rest.
-    assert 0.7 < desk.until(Doing.ARMING, VIEW, 3.0) < 1.3
+    # The person sees the first telemetry one reaction late, and arming requires a rest while the link is up.
+    assert 1.2 < desk.until(Doing.ARMING, VIEW, 3.0) < 1.5
     assert all(hands.buttons == {Button.L1, Button.OPTIONS} for hands in desk.watch(VIEW, 0.1))
     desk.until(Doing.ADVANCING, armed((0.0, 0.0, 0.3)), 0.5)
     assert desk.watch(armed((0.0, 0.0, 0.3)), 1.0)[-1].r2_n > 0.0
@@ -111,6 +111,15 @@ def test_the_task_from_waiting_to_withdrawing() -> None:
     for hands in desk.watch(at_height(0.335, 0.33, holding=False), 1.0):
         assert (hands.l2_n, hands.r2_n, hands.left, hands.buttons) == (0.0, 0.0, (0.0, 0.0), frozenset({Button.L1}))
     assert all(Button.L1 in hands.buttons and hands.right == (0.0, 0.0) for hands in desk.hands)
+
+
+def test_a_rest_while_the_link_is_lost_does_not_count() -> None:
+    desk = Desk()
+    desk.until(Doing.ARMING, VIEW, 3.0)
+    desk.tell(Feel(light=WARNING_LIGHT))
+    assert all(hands.buttons == {Button.L1} for hands in desk.watch(VIEW, 3.0))
+    desk.tell(Feel(light=USUAL_LIGHT))
+    assert 1.2 < desk.until(Doing.ARMING, VIEW, 3.0) < 1.8
 
 
 @pytest.mark.parametrize("marks", [False, True])
