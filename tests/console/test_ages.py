@@ -126,3 +126,32 @@ def test_after_a_stop_only_the_reset_lets_hold_to_run_count(browser: Browser) ->
         alone.page.raw.keyboard.down("Space")
         alone.let_pass(0.3)
         assert alone.state == "armed"
+
+
+@pytest.mark.parametrize("after_s", [0.1, 0.6])
+def test_a_stop_that_was_reset_stays_confirmed(browser: Browser, after_s: float) -> None:
+    """X counts however soon it comes after STOPPED; nothing says afterwards that the stop was not confirmed."""
+    with hands_alone(browser) as alone:
+        alone.run()
+        alone.page.raw.keyboard.press("Escape")
+        alone.page.raw.keyboard.up("Space")
+        alone.let_pass(after_s)
+        assert alone.page.text("#hands_stopped") == "STOPPED: X resets."
+        alone.page.raw.keyboard.press("KeyX")
+        alone.let_pass(1.9)
+        alone.expect("Ready")
+        alone.page.raw.keyboard.down("Space")
+        alone.let_pass(0.2)
+        assert (alone.state, alone.page.text("#hands_stopped")) == ("armed", "")
+        assert [message["hands"]["reset"] for message in alone.messages[-50:]] == [False] * 50
+
+
+def test_a_state_from_before_the_stop_does_not_confirm_it(browser: Browser) -> None:
+    with hands_alone(browser) as alone:
+        status = {"state": "stopped", "link": "up", "owner": "armed"}
+        alone.facts = {"status": status, "round_trip_ms": 400.0}
+        alone.page.raw.keyboard.press("Escape")
+        alone.let_pass(0.3)
+        assert alone.messages[-1]["hands"]["stop"]
+        alone.let_pass(0.2)
+        assert not alone.messages[-1]["hands"]["stop"]

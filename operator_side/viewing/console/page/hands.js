@@ -18,6 +18,7 @@ const SILENCE_MS = 500; // without facts for longer the arm's state is unknown
 const AGREES_MS = 500; // time until the facts reflect our messages
 const STOP_MS = 200;
 const STOP_TRIES_MS = 5000;
+const RESET_TRIES_MS = 1000; // the operator side takes no reset until the stop was released for a while
 const EDITS = "input:not([type=button]), select, textarea, [contenteditable=true]";
 
 export class Hands {
@@ -41,7 +42,7 @@ export class Hands {
   #stopHeld = new Set();
   #confirmed = false; // since that press, the arm was stopped: the same press stops it no second time
   #giveBack = false;
-  #reset = false;
+  #resetMs = null; // time of the last press of the reset, until it counts
   #marked = null; // mark whose button of a gamepad is held
   #why = "";
 
@@ -80,7 +81,9 @@ export class Hands {
   show(facts) {
     this.#facts = facts;
     this.#factsMs = performance.now();
-    this.#confirmed ||= facts.status.state === MotionState.STOPPED;
+    const reached = this.#factsMs - this.#stopMs >= (facts.round_trip_ms ?? 0); // a state from before tells nothing
+    this.#confirmed ||= facts.status.state === MotionState.STOPPED && reached;
+    if (!this.#hands?.reset_first) this.#resetMs = null;
     this.#agree();
     this.#tuning.show(facts);
     this.#draw();
@@ -181,6 +184,7 @@ export class Hands {
       this.#stopHeld.add(by);
       this.#stopMs = performance.now();
       this.#confirmed = false;
+      this.#resetMs = null;
       this.#release("You pressed the emergency stop.");
       this.#step();
     } else if (!held) this.#stopHeld.delete(by);
@@ -195,11 +199,9 @@ export class Hands {
   }
 
   #resetNow() {
-    if (this.#stops || !this.#hands?.reset_first) return;
+    if (this.#unconfirmed || !this.#hands?.reset_first) return;
+    this.#resetMs = performance.now();
     this.#release("The stop was reset.");
-    this.#reset = true;
-    this.#say(REST);
-    this.#reset = false;
     this.#say(REST);
   }
 
@@ -210,11 +212,16 @@ export class Hands {
     if (mark !== null && mark !== before && this.#hands?.may_drive) this.#send({ mark });
   }
 
+  #within(sinceMs, forMs) {
+    return sinceMs !== null && performance.now() - sinceMs < forMs;
+  }
+
+  get #unconfirmed() {
+    return !this.#confirmed && this.#within(this.#stopMs, STOP_TRIES_MS);
+  }
+
   get #stops() {
-    if (this.#stopMs === null) return false;
-    const sinceMs = performance.now() - this.#stopMs;
-    const goesOn = !this.#confirmed && sinceMs < STOP_TRIES_MS;
-    return this.#stopHeld.size > 0 || sinceMs < STOP_MS || goesOn;
+    return this.#stopHeld.size > 0 || this.#within(this.#stopMs, STOP_MS) || this.#unconfirmed;
   }
 
   #step() {
@@ -270,16 +277,17 @@ export class Hands {
     }
   }
 
-  // Send at once on any change, and 50 times a second while we drive or stop; wire.js numbers it.
+  // Send at once on any change, and 50 times a second while we drive, stop or reset; wire.js numbers it.
   #say(hands) {
     const stop = this.#stops;
     const driving = this.#state !== "watching";
-    const said = { ...hands, driving, stop, reset: this.#reset, give_back: this.#giveBack };
+    const reset = !stop && this.#within(this.#resetMs, RESET_TRIES_MS);
+    const said = { ...hands, driving, stop, reset, give_back: this.#giveBack };
     const text = JSON.stringify(said);
     const nowMs = performance.now();
     const changed = text !== this.#sent;
-    if (!changed && (!(driving || stop) || nowMs - this.#sentMs < PERIOD_MS - 2)) return;
-    if (this.#sent === "" && !driving && !stop && !this.#reset && !this.#giveBack) return; // nothing to send yet
+    if (!changed && (!(driving || stop || reset) || nowMs - this.#sentMs < PERIOD_MS - 2)) return;
+    if (this.#sent === "" && !driving && !stop && !reset && !this.#giveBack) return; // nothing to send yet
     this.#sent = text;
     this.#sentMs = nowMs;
     this.#send({ hands: { page: this.#page, shown_s: this.#shownS(), ...said } });
@@ -290,7 +298,8 @@ export class Hands {
     this.#panel.show({
       state: this.#state, why: this.#why, restMs, moves: this.#moves, facts: this.#facts, hands: this.#hands,
       mine: this.#hands?.driver === this.#page, level: this.#keys.level,
-      stop: this.#stopMs === null ? null : { sinceMs: performance.now() - this.#stopMs, goesOn: this.#stops },
+      stop: this.#stopMs === null ? null
+        : { sinceMs: performance.now() - this.#stopMs, goesOn: this.#unconfirmed, confirmed: this.#confirmed },
     });
   }
 }

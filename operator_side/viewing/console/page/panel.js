@@ -122,7 +122,7 @@ export class Panel {
       return hands?.reset_first ? "STOPPED: X resets."
         : hands?.may_drive ? "The stop was reset: hold Space to arm." : "STOPPED. The controller arms again.";
     }
-    if (stop === null) return "";
+    if (stop === null || stop.confirmed) return "";
     if (facts?.status.owner === SessionState.OBSERVING) return "Only the owner can stop the robot: this operator observes.";
     if (stop.goesOn) return "Stop sent; the robot side has not confirmed it yet.";
     return stop.sinceMs < 10_000 ? "THE STOP WAS NOT CONFIRMED by the robot side." : "";
