@@ -31,8 +31,10 @@ def doing_words(doing: Doing) -> str:
     return _SAID.get(doing, words(doing))
 
 
-def lease_words(state: SessionState | None) -> str:
-    """Return an operator's state in words; empty for none."""
+def lease_words(state: SessionState | None, *, reset_first: bool = False) -> str:
+    """Return an operator's state in words; empty for none. reset_first: whether a stop waits for a page's reset."""
+    if reset_first and state is SessionState.STOPPED_READY:
+        state = SessionState.STOPPED
     return words(state) if state is None else _LEASE.get(state, words(state))
 
 

@@ -152,6 +152,11 @@ class OperatorFacts(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     robot: RobotStatus | None = None
     """Robot side's status, where both sides run in one process or recording; else None"""
 
+    @property
+    def reset_first(self) -> bool:
+        """Whether a stop waits for its reset by a page, so that nothing arms before."""
+        return self.page is not None and self.page.reset_first
+
 
 class ShownKind(StrEnum):
     """Kind of a message to a console page."""

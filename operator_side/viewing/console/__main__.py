@@ -270,7 +270,7 @@ def said(facts: OperatorFacts) -> dict[str, Any]:
         "state": state.upper(),
         "why": (None if state == view.phase else view.phase, view.reason),
         "link": link_words(status),
-        "lease": lease_words(status.owner) or None,
+        "lease": lease_words(status.owner, reset_first=facts.reset_first) or None,
         "whose": "scripted person" if facts.hands is InputSource.PERSON else words(facts.hands),
         "holding": None if status.holding is None else f"{view.holding or 'nothing'}{view.stands}",
     }

@@ -82,7 +82,8 @@ def _standing(facts: OperatorFacts, view: LiveView) -> list[Text]:
     """Draw figures of the link over the last second, of the nearest object, the target and the held object."""
     status, robot, known = view.operator, view.robot, view.scene
     feel = {} if status.feel in (None, Sight.SEEING) else {"feel": words(status.feel)}
-    who = {"lease": lease_words(status.owner), "hands": words(facts.hands), "controller": words(status.controller)}
+    lease = lease_words(status.owner, reset_first=facts.reset_first)
+    who = {"lease": lease, "hands": words(facts.hands), "controller": words(status.controller)}
     lines = [_named(link=link_words(status), **who, **feel)]
     for name, delay in (("to operator", facts.to_operator), ("to robot   ", facts.to_robot)):
         mean, p99, newest = (_figure(value, 5) for value in (delay.mean_ms, delay.p99_ms, delay.newest_ms))
@@ -98,7 +99,7 @@ def _standing(facts: OperatorFacts, view: LiveView) -> list[Text]:
         centre = number(robot.target_mm) is None
         way = f"centre at {millimetres(status.target_centre_mm)}" if centre else f"at {millimetres(robot.target_mm)}"
         target = f"{known.target} {way}"
-    nearest = f"{robot.nearest or 'nearest thing'} at {millimetres(robot.nearest_mm)}"
+    nearest = f"{robot.nearest} at {millimetres(robot.nearest_mm)}" if robot.nearest else millimetres(robot.nearest_mm)
     asked = "" if facts.probability is None else f"   P {facts.probability:g}"
     enlarged_m = 0.0 if facts.screen is None else facts.screen.enlargement_m
     enlarged = UNKNOWN if enlarged_m == 0.0 else f"{_figure(1e3 * enlarged_m)} mm"

@@ -12,11 +12,13 @@ from rich.cells import cell_len
 from rich.console import Console
 from rich.screen import Screen as Whole
 
+from common.command.live_line import UNKNOWN
 from common.errors import ConfigurationError
 from common.protocol.session import SessionState
 from common.status.codes import LinkState, Sight
 from common.status.statuses import RobotStatus
-from operator_side.viewing.facts import OperatorFacts, SceneFacts
+from operator_side.viewing.console.__main__ import said as said_on_page
+from operator_side.viewing.facts import HandsFacts, OperatorFacts, SceneFacts
 from operator_side.viewing.terminal.screen import SILENT_AFTER_S, Screen
 from operator_side.viewing.terminal.status import TerminalStatus
 from tests.operator_side.console_feed import facts
@@ -77,6 +79,20 @@ def test_everything_is_on_a_screen_of_the_usual_size() -> None:
         *("holding nothing", "delay ", "meets  ", "overlap ", "tick p99 ", "140 of 140 µs", "note 99 ?[2J"),
     ):
         assert said in text
+
+
+def test_nothing_near_has_no_name() -> None:
+    text = "\n".join(drawn(with_status(RobotStatus())))
+    assert f"nearest {UNKNOWN} mm" in text
+
+
+@pytest.mark.parametrize(("reset_first", "lease"), [(True, "lease stopped  "), (False, "lease stopped, ready to arm")])
+def test_a_stop_that_waits_for_its_reset_is_not_ready_to_arm(reset_first: bool, lease: str) -> None:
+    shown = with_status(state="stopped", owner=SessionState.STOPPED_READY)
+    page = HandsFacts(may_drive=True, driver="page", person=False, tuning_refused="", link_asked=None, counts=1.0)
+    shown = msgspec.structs.replace(shown, page=msgspec.structs.replace(page, reset_first=reset_first))
+    assert lease in "\n".join(drawn(shown, width=120))
+    assert said_on_page(shown)["lease"] == lease.removeprefix("lease ").strip()
 
 
 @pytest.mark.parametrize(
