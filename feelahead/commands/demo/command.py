@@ -15,6 +15,7 @@ from common.emulation.figures import report_lines
 from common.emulation.spec import Direction, Stream, unused_clauses
 from common.errors import ConfigurationError
 from common.files.output_file import write_json
+from common.recording.packages import require_packages
 from common.recording.side import RecorderProcess
 from feelahead.both_sides.settings_files import check_settings_files
 from feelahead.both_sides.summary import merge_summaries, read_summary
@@ -22,7 +23,9 @@ from feelahead.commands.demo.compare import compare
 from feelahead.commands.demo.page import KeptPage
 from feelahead.commands.demo.run import run_both, too_slow
 from feelahead.commands.demo.settings import DemoSettings
+from operator_side.people.simulated_hands import own_person
 from operator_side.viewing.terminal.status import TerminalStatus
+from robot_side.laws.named import find_law
 
 _SENT: tuple[tuple[Direction, Stream], ...] = (
     ("to_robot", "haptics"),
@@ -42,6 +45,7 @@ def demo(arguments: Sequence[str]) -> int:
     given = given_fields(arguments, DemoSettings)
     if settings.compare:
         return compare(settings, given)
+    _check_parts(settings)
     errors: list[str] = []
     try:
         with TerminalStatus("feelahead demo") if settings.tui else Status(settings.status, "feelahead demo") as status:
@@ -71,6 +75,18 @@ def demo(arguments: Sequence[str]) -> int:
         for error in errors:
             sys.stderr.write(f"feelahead demo: {error}\n")
     return 1 if errors else 0
+
+
+def _check_parts(settings: DemoSettings) -> None:
+    """Raise ConfigurationError for what a side would refuse later: a missing package, a law, person or model."""
+    require_packages("demo", "mujoco", "numba", extra="robot")
+    find_law(settings.law)
+    if settings.person_file is not None:
+        own_person(settings.person_file)
+    if settings.model is not None:
+        from robot_side.drivers.mujoco.brought.trial import try_model  # noqa: PLC0415  # MuJoCo is slow to import
+
+        try_model(settings.model.resolve())
 
 
 def _report(summary: dict[str, Any]) -> list[str]:

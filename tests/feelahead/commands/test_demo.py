@@ -28,6 +28,7 @@ from feelahead.commands.demo.settings import DemoSettings
 from operator_side.settings import OperatorSettings
 from robot_side.settings import RobotSettings
 from tests.helpers.python_process import start
+from tests.helpers.refusal import refusal
 from tests.operator_side.viewing.terminal.on_terminal import OnTerminal
 
 LISTENING = {"control": "tcp://127.0.0.1:1", "view": "tcp://127.0.0.1:2"}
@@ -58,6 +59,33 @@ def test_a_sides_file_is_checked_before_a_side_is_started(flag: str, tmp_path: P
     config.write_text("nothing = 1")
     with pytest.raises(ConfigurationError, match=f"^{flag} .*unknown key 'nothing'; valid: "):
         demo([flag, str(config)])
+
+
+@pytest.mark.parametrize(
+    ("flags", "written", "said"),
+    [
+        ("--law part.py", None, "law part.py: there is no such file; valid: a Python file that defines law"),
+        ("--law part.py", "law = (", "law part.py: SyntaxError, line 1: '(' was never closed"),
+        ("--law part.py", "x = 1", "law part.py: the file defines no law"),
+        ("--law part.py", "import no_such", "law part.py: ModuleNotFoundError, part.py line 1: No module"),
+        ("--person-file part.py", "person = 3", "person: int lacks act"),
+        ("--model part.xml --site tool", "<mujoco", "model part.xml: XML parse error"),
+    ],
+)
+def test_a_part_is_refused_before_a_side_is_started(
+    flags: str, written: str | None, said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(module, "run_both", lambda *_: pytest.fail("a side was started"))
+    if written is not None:
+        Path(flags.split()[1]).write_text(written)
+    assert refusal(demo, flags.split()).startswith(said)
+
+
+def test_a_missing_package_is_said_before_a_side_is_started(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "mujoco", None)
+    monkeypatch.setattr(module, "run_both", lambda *_: pytest.fail("a side was started"))
+    assert re.search(r"mujoco is not installed; .*\[robot\]", refusal(demo, []))
 
 
 def test_given_flags_are_passed_on_to_the_side_that_takes_them_even_if_default(tmp_path: Path) -> None:

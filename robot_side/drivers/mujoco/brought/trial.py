@@ -29,11 +29,11 @@ _LONGEST_S: Final = 120.0
 _PR_SET_PDEATHSIG: Final = 1
 _ENDING: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 _LONGEST: Final = 4096
-_UNUSABLE: Final = "model: {}; valid: an MJCF file that MuJoCo compiles"
-_TOO_LARGE: Final = "model: takes MuJoCo more than {} GB of memory, or makes it fail; valid: a smaller model"
+_UNUSABLE: Final = "{}; valid: an MJCF file that MuJoCo compiles"
+_TOO_LARGE: Final = "takes MuJoCo more than {} GB of memory, or makes it fail; valid: a smaller model"
 _WITHOUT_REASON: Final = "Caught an unknown exception"
 """Error of MuJoCo where C++ has no memory left, for one"""
-_TOO_SLOW: Final = "model: takes MuJoCo more than {} s of processor time; valid: a smaller model"
+_TOO_SLOW: Final = "takes MuJoCo more than {} s of processor time; valid: a smaller model"
 
 
 @cache
@@ -64,16 +64,20 @@ def try_model(path: Path) -> None:
         _, status = os.waitpid(child, 0)
     code = os.waitstatus_to_exitcode(status)
     if code == -signal.SIGXCPU:
-        raise ConfigurationError(_TOO_SLOW.format(_MOST_CPU_S))
-    if code < 0:
-        raise ConfigurationError(_UNUSABLE.format(f"ends MuJoCo's compiler by {signal.Signals(-code).name}"))
+        why = _TOO_SLOW.format(_MOST_CPU_S)
+    elif code < 0:
+        why = _UNUSABLE.format(f"ends MuJoCo's compiler by {signal.Signals(-code).name}")
     if why:
-        raise ConfigurationError(why)
+        raise ConfigurationError(f"model {path.name}: {why}")
 
 
 def unusable(error: Exception) -> ConfigurationError:
     """Return the error about a model that MuJoCo does not compile, in one line."""
-    return ConfigurationError(_UNUSABLE.format(" ".join(str(error).split())))
+    return ConfigurationError(f"model: {_why(error)}")
+
+
+def _why(error: BaseException) -> str:
+    return _UNUSABLE.format(" ".join(str(error).split()))
 
 
 def hearing_signals(work: Callable[[], Result]) -> Result:
@@ -117,7 +121,7 @@ def _compile_and_leave(path: Path, writing: int) -> NoReturn:
     except MemoryError:
         why = _TOO_LARGE.format(_MOST_BYTES >> 30)
     except BaseException as error:  # whatever it is, this process ends here
-        why = str(unusable(error))  # type: ignore[arg-type]
+        why = _why(error)
         if _WITHOUT_REASON in why:
             why = _TOO_LARGE.format(_MOST_BYTES >> 30)
     finally:

@@ -33,8 +33,8 @@ def written(folder: Path, world: str = "", assets: str = "") -> Path:
 @pytest.mark.parametrize(
     ("world", "assets", "told"),
     [
-        (GRID, "", "model: takes MuJoCo more than 0 GB of memory"),
-        ('<geom type="hfield" hfield="field"/>', FIELD, "model: takes MuJoCo more than 0 GB of memory"),
+        (GRID, "", "model model.xml: takes MuJoCo more than 0 GB of memory"),
+        ('<geom type="hfield" hfield="field"/>', FIELD, "model model.xml: takes MuJoCo more than 0 GB of memory"),
         ("", TEXTURE, "Could not allocate memory for texture"),
         ("<geom size='-1'/>", "", "; valid: an MJCF file that MuJoCo compiles"),
     ],
