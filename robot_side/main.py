@@ -17,7 +17,7 @@ from common.sockets.door.client import Door
 from common.sockets.door.messages import DoorSettings
 from robot_side.commissioning.measuring import measure
 from robot_side.compiled.kernel import late_kernels
-from robot_side.compiled.warm_up import kernel_digests, kernels_compiled, warm_up
+from robot_side.compiled.warm_up import COMPILING, kernel_digests, kernels_compiled, warm_up
 from robot_side.core.robot_parts import RobotParts
 from robot_side.core.robot_side import RobotSide
 from robot_side.drivers.mujoco.simulation_witness import witness_of
@@ -38,10 +38,6 @@ from robot_side.viewing.scene_view import SceneView
 from robot_side.viewing.shapes import SceneModel
 from robot_side.viewing.surfaces import SurfaceModel
 
-_COMPILING: Final = (
-    "compiling for this processor, some ten seconds at the first start (or beforehand: feelahead doctor --compile):"
-    " {} of {} kernels are ready"
-)
 _REMEDY: Final = "fewer or simpler objects, a coarser cover (cover_m), fewer views and observers, or a faster machine"
 _OPEN_TO_ALL: Final = "WITHOUT KEYS: anyone who reaches the port can move the arm"
 
@@ -102,7 +98,7 @@ def command(arguments: Sequence[str], adapt: Callable[[RobotParts], Adapted] = a
         for text in unused:
             process.note(text)
         cameras = _cameras(settings, parts, drivers, process, loop.clock.now())
-        warm_up(lambda ready, of: process.note(_COMPILING.format(ready, of)), parts.kernels)
+        warm_up(lambda ready, of: process.note(f"{COMPILING}: {ready} of {of} kernels are ready"), parts.kernels)
         drivers.wait(write_audit)
         if surfaces is not None:
             surfaces.wait(parts.arm, parts.scene, loop.clock, write_audit)

@@ -1,8 +1,10 @@
 """An episode: both sides and their link in this process, in virtual time, built and driven by a few calls."""
 
 import math
+import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Self
 
@@ -28,7 +30,7 @@ from operator_side.people.port import FingerInput, Pulling
 from operator_side.settings import OperatorSettings
 from operator_side.viewing.pages.driving_page import DrivingPage
 from robot_side.arm.own_arm import moved_by
-from robot_side.compiled.warm_up import warm_up
+from robot_side.compiled.warm_up import COMPILING, warm_up
 from robot_side.core.robot_side import RobotSide
 from robot_side.depth.camera_settings import BY_DEPTH
 from robot_side.drivers.mujoco.scene import Scene, load_scene
@@ -119,7 +121,7 @@ class Episode:
         if notes is not None:
             listeners += recorders(witness_of(self.scene, parts.arm), parts.truth, notes.note)
         robot_side = RobotSide(self.parts, listeners)
-        warm_up()  # after the scene was loaded, as it decides which kernels are imported
+        warm_up(lambda *_: _say_compiling())  # after the scene was loaded, as it decides which kernels are imported
         hearing = [*self._operator_listeners, *([] if notes is None else [notes.operator])]
         operator = build_operator_side(self.operator_settings, 2, VIRTUAL_CLOCK, hearing)
         self.device = self._device or SimulatedDualSense()
@@ -290,6 +292,12 @@ class Episode:
 def _require_seconds(seconds: float) -> None:
     if not (isinstance(seconds, int | float) and math.isfinite(seconds) and seconds >= 0.0):
         raise ValueError(f"seconds = {seconds!r}; valid: a number from 0 on")
+
+
+@cache
+def _say_compiling() -> None:
+    """Say on standard error, once in this process, that kernels are compiled."""
+    sys.stderr.write(f"feelahead: {COMPILING}\n")
 
 
 def _load(settings: RobotSettings) -> Scene:

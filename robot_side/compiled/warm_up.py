@@ -13,6 +13,9 @@ from common.skipped import Part
 from robot_side.compiled.kernel import JIT, Compiled, imported_kernels
 from robot_side.compiled.sources import digest
 
+COMPILING: Final = (
+    "compiling for this processor, about half a minute at the first start (or beforehand: feelahead doctor --compile)"
+)
 _NOTEWORTHY_S: Final = 1.0
 """Duration of a compilation after which it is announced"""
 _BETWEEN_NOTES_S: Final = 4.0

@@ -185,7 +185,7 @@ class _Questions:
             f"{self._place} speaks ZeroMQ and does not answer: "
             "a robot side that is starting or paused, its view port, or another program"
         )
-        remedy = "wait until it listens (its first start compiles for some ten seconds), and give its control port"
+        remedy = "wait until it listens (its first start compiles for about half a minute), and give its control port"
         return PathError("no answer", said, remedy)
 
     def _ask(self) -> bool:

@@ -78,9 +78,9 @@ def check_kernels(facts: KernelFacts | None) -> list[Finding]:
         return []
     if not facts.missing:
         return [Finding("kernels", Verdict.OK, f"{facts.kernels} compiled for this processor, in {facts.folder}")]
-    said, remedy = "the first start compiles them, in some ten seconds", COMPILE
+    said, remedy = "the first start compiles them, in about half a minute", COMPILE
     if not facts.writable:
-        said = f"{facts.folder} cannot keep them: each start compiles for some ten seconds"
+        said = f"{facts.folder} cannot keep them: each start compiles for about half a minute"
         remedy = f"let this user write to {facts.folder}, or set NUMBA_CACHE_DIR to another folder; then: {COMPILE}"
     missing = f"{facts.missing} of {facts.kernels} are not compiled for this processor"
     return [Finding("kernels", Verdict.NOTE, f"{missing}: {said}", remedy)]

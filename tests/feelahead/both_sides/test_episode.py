@@ -12,11 +12,14 @@ from common.errors import ConfigurationError, FeelaheadError
 from common.recording.reading import open_recording
 from common.roles import Role
 from feelahead import Episode, FingerInput, LawInputs, LinkProfile, Seen, Sensed, Situation
+from feelahead.both_sides.episode import _say_compiling
 from feelahead.recordings.replay_robot import replay_robot
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
+from robot_side.compiled import warm_up
 from robot_side.settings import CameraSettings
 from robot_side.surroundings.perceived import ObjectSource, PerceivedObjects
 from tests.helpers.repository import DATA
+from tests.robot_side.compiled.fresh_kernels import fresh_kernels
 
 WALL: dict[str, Any] = {"scene": "wall", "link": "delay 100ms", "seed": 3}
 
@@ -317,3 +320,20 @@ def test_what_cannot_be_done_is_refused_before_it_is(does: Any, said: str) -> No
     with pytest.raises(ValueError) as refused:  # noqa: PT011
         does(Episode(scene="wall"))
     assert said in str(refused.value)
+
+
+def test_compiling_is_said_once_and_not_where_the_kernels_are_kept(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    Episode(**WALL)  # its own kernels are ready from here on
+    monkeypatch.setattr(warm_up, "imported_kernels", fresh_kernels)
+    monkeypatch.setattr(warm_up, "_NOTEWORTHY_S", 0.0)
+    said = []
+    for folder, anew in (("a", True), ("b", False), ("a", True)):
+        monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / folder))
+        if anew:
+            _say_compiling.cache_clear()
+        capsys.readouterr()
+        Episode(**WALL)
+        said.append(capsys.readouterr().err)
+    assert said == [f"feelahead: {warm_up.COMPILING}\n", "", ""]
