@@ -32,6 +32,11 @@ class OtherVersionError(RemoteProtocolError):
 class DeviceError(FeelaheadError):
     """The controller cannot be opened, read or written."""
 
+    def __init__(self, said: str, remedy: str = "") -> None:
+        super().__init__(f"{said}: {remedy}" if remedy else said)
+        self.said = said
+        self.remedy = remedy
+
 
 class NoDeviceError(DeviceError):
     """No controller is connected."""

@@ -12,6 +12,7 @@ from types import FrameType
 
 from common.command.flag_value import value_of
 from common.command.stop_signal import STOP_SIGNALS, LeavingAtOnce, say_output_failed
+from common.extras import installing
 
 Command = Callable[[Sequence[str]], int]
 
@@ -50,8 +51,7 @@ def launch(program: str, load: Callable[[], Command], extra: str | None = None, 
         missing = (error.name or "").partition(".")[0]
         if missing in _OURS:
             raise
-        wanted = "." if extra is None else f".[{extra}]"
-        sys.stderr.write(f"{program}: {missing} is not installed; install it in the clone: pip install '{wanted}'\n")
+        sys.stderr.write(f"{program}: {missing} is not installed; to install it: {installing(extra)}\n")
         sys.exit(_BAD_INPUT)
     try:
         for number in () if has_summary else STOP_SIGNALS:

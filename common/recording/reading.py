@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 from common.errors import ConfigurationError
+from common.extras import require_packages
 from common.recording.mcap_scan import Part, Scan, messages_in
-from common.recording.packages import require_packages
 from common.recording.topics import OURS
 from common.recording.wire import FORMAT, PROFILE
 

@@ -18,8 +18,8 @@ from common.clock import MonotonicClock
 from common.companion.channel import Channel
 from common.companion.process import Companion
 from common.errors import ConfigurationError
+from common.extras import require_packages
 from common.recording.entries import pack_block
-from common.recording.packages import require_packages
 from common.recording.topics import FACTS_TOPIC, json_schema
 from common.recording.wire import BLOCK, END, FACTS, HEADER, NOTE, SCHEMA, STATUS, VIEW, as_json, stamped
 

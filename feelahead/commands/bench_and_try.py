@@ -11,6 +11,7 @@ from importlib import import_module
 from pathlib import Path
 
 from common.errors import ConfigurationError
+from common.extras import installing
 from common.files.plugged import find, known
 
 _QUESTIONS = Path(__file__).parents[1] / "lab" / "questions"
@@ -61,7 +62,7 @@ class Menu:
         except (ImportError, SyntaxError) as error:
             reason = f"{error}; valid: a Python file that defines QUESTION"
             if name in self.questions and isinstance(error, ModuleNotFoundError):
-                remedy = f"install it in the clone: pip install '.[{self.questions[name]}]'"
+                remedy = f"to install it: {installing(self.questions[name])}"
                 reason = f"{error.name} is not installed; {remedy}"
             raise ConfigurationError(f"{self.name} {name}: {reason}") from error
         if name not in self.questions and Path(found.__file__ or "").resolve() != Path(name).resolve():

@@ -13,9 +13,9 @@ from msgspec import Meta
 
 from common.command.command_line import parse_settings
 from common.errors import ConfigurationError, FeelaheadError
+from common.extras import installing, require_packages
 from common.files.output_file import require_output_file
 from common.limits import Limited, check_limits
-from common.recording.packages import require_packages
 from common.recording.reading import Recording, open_recording
 from common.units import parse_duration
 from feelahead.printing.progress import progress
@@ -25,7 +25,7 @@ from robot_side.laws.named import require_law
 from robot_side.laws.paper_settings import PaperFlags
 
 _Speed = Annotated[float, Meta(gt=0.0, le=1000.0)]
-_BOTH_SIDES = "install it in the clone: pip install '.[robot,operator,record]'"
+_BOTH_SIDES = f"to install it: {installing('robot,operator,record')}"
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from typing import Any, cast
 
 from common.errors import ConfigurationError, FeelaheadError
-from common.recording.packages import require_packages
+from common.extras import require_packages
 from feelahead.lab.scheduler import Scheduler
 
 _CONNECT_S = "10s"

@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import Any
 
 from common.errors import ConfigurationError
+from common.extras import require_packages
 from common.files.output_file import output_file
-from common.recording.packages import require_packages
 
 Row = dict[str, Any]
 """Figures by name, as JSON values. Scalars go to `--summary`, `--csv` and `--parquet`, lists and nested

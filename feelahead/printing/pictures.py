@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from common.errors import ConfigurationError
-from common.recording.packages import require_packages
+from common.extras import require_packages
 
 PICTURES: Final = (".png", ".svg", ".pdf")
 """Endings that a picture's file name may have."""

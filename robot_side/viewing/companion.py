@@ -16,6 +16,7 @@ import numpy.typing as npt
 from common.clock import MonotonicClock
 from common.companion.channel import Channel
 from common.companion.process import companion_channel
+from common.extras import installing
 from common.protocol.codec import VIEW_MAXIMUM_BYTES
 from common.protocol.view_messages import ViewName
 from common.realtime.priority import lower_priority
@@ -45,7 +46,7 @@ def main() -> None:
     try:
         import simplejpeg  # noqa: F401, PLC0415  # may be missing
     except ImportError as error:
-        _refuse(channel, f"{error}; install it in the clone: pip install '.[robot]'")
+        _refuse(channel, f"{error}; to install it: {installing('robot')}")
         return
     _serve(channel, f"{'; '.join(troubles)}; to mend it: {REMEDY}" if trouble is not None else "")
 

@@ -14,8 +14,8 @@ from common.command.stop_signal import StopSignal
 from common.emulation.figures import report_lines
 from common.emulation.spec import Direction, Stream, unused_clauses
 from common.errors import ConfigurationError
+from common.extras import require_packages
 from common.files.output_file import write_json
-from common.recording.packages import require_packages
 from common.recording.side import RecorderProcess
 from feelahead.both_sides.settings_files import check_settings_files
 from feelahead.both_sides.summary import merge_summaries, read_summary

@@ -14,6 +14,7 @@ from rich.table import Table
 from common.command.status import Status
 from common.command.stop_signal import StopSignal
 from common.errors import ConfigurationError
+from common.extras import installing
 from common.files.output_file import write_json
 from feelahead.commands.demo.settings import DemoSettings
 from feelahead.commands.open_browser import show_address
@@ -70,7 +71,7 @@ def compute(settings: DemoSettings, *, pictures: bool | None = None) -> list[dic
         from feelahead.both_sides.grasping_trial import MISJUDGES_DEPTH, Trial  # noqa: PLC0415
         from feelahead.commands.demo.compared_run import compared_run  # noqa: PLC0415
     except ModuleNotFoundError as error:
-        why = f"--compare: {error.name} is not installed; pip install '.[robot,operator]' in the clone"
+        why = f"--compare: {error.name} is not installed; to install it: {installing('robot,operator')}"
         raise ConfigurationError(why) from error
     drawn = settings.console and sys.stdout.isatty() if pictures is None else pictures
     limit_s = settings.duration or _LONGEST_S

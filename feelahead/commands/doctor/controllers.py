@@ -65,8 +65,7 @@ def controllers_seen() -> list[Finding]:
     try:
         backend = load_backend()
     except NoDriverError as error:
-        said, _, remedy = str(error).partition(": ")
-        return [Finding(_NAME, Verdict.NOTE, f"cannot be looked for: {said}", remedy)]
+        return [Finding(_NAME, Verdict.NOTE, f"cannot be looked for: {error.said}", error.remedy)]
     how = "connect one by USB, or pair one by Bluetooth: hold Create and PS until its light flashes"
     none = Finding(_NAME, Verdict.NOTE, "none is connected (the demo simulates one)", how)
     found = sightings(backend)
@@ -101,8 +100,7 @@ def _look_at(backend: HidBackend, path: bytes, model: str) -> Finding:
         device = HidDualSense(backend, path)
         device.check_presence()
     except DeviceError as error:
-        said, _, remedy = str(error).partition(": ")
-        return Finding(_NAME, Verdict.MISSING, f"{place}: {said}", remedy or None)
+        return Finding(_NAME, Verdict.MISSING, f"{place}: {error.said}", error.remedy or None)
     identity, firmware, battery = device.identity, "unknown", "unknown"
     device.close()
     if (known := identity.firmware) is not None:

@@ -12,6 +12,7 @@ from rich.console import Console
 from rich.progress import Progress
 
 from common.errors import ConfigurationError
+from common.extras import installing
 from feelahead.commands.doctor.finding import Finding, Verdict
 from robot_side.drivers.mujoco.drawing.off_screen import BACKENDS, REMEDY
 
@@ -65,7 +66,7 @@ def check_extra(extra: str, failures: Mapping[str, str]) -> Finding:
     broken = [f"{module} ({reason})" for module, reason in failures.items() if module not in absent]
     reasons = {"not installed": absent, "cannot be imported": broken}
     said = "; ".join(f"{how}: {', '.join(found)}" for how, found in reasons.items() if found)
-    remedy = f"pip install {'--force-reinstall ' if broken else ''}'.[{extra}]'  # in the clone"
+    remedy = installing(extra, again=bool(broken))
     return Finding(name, Verdict.NOTE, f"{said} (for {purpose})", remedy)
 
 
@@ -172,7 +173,7 @@ def compile_kernels(*, as_json: bool) -> int:
 
         kernels = import_kernels()
     except ImportError as error:
-        raise ConfigurationError(f"--compile: {error}; install it in the clone: pip install '.[robot]'") from error
+        raise ConfigurationError(f"--compile: {error}; to install it: {installing('robot')}") from error
     missing = {kernel.name for kernel in kernels if not kernel.is_kept}
     console = Console(stderr=True)
 

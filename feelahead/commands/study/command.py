@@ -13,6 +13,7 @@ from rich.console import Console, RenderableType
 
 from common.command.command_line import parse_settings
 from common.errors import ConfigurationError
+from common.extras import installing
 from common.limits import Limited
 from feelahead.printing.figures import shown
 from feelahead.study.balance import ANSWER_S, delay_places, follows, most_minutes, places, whole_square
@@ -180,5 +181,5 @@ def _late(module: str) -> Any:
         return import_module(module)
     except ModuleNotFoundError as error:
         raise ConfigurationError(
-            f"study: {error.name} is not installed; in the clone: pip install '.[robot,operator,record,study]'"
+            f"study: {error.name} is not installed; to install it: {installing('robot,operator,record,study')}"
         ) from error

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from common.arrays import FloatArray
+from common.extras import installing
 from feelahead.lab.reference.pairs import Pairs
 
 SDIST = "pip download --no-deps --no-binary overlap overlap==0.2.0"
@@ -46,7 +47,7 @@ class PythonPackage:
 
     def __init__(self) -> None:
         found = importlib.util.find_spec("overlap") is not None
-        self.missing = "" if found else "not installed; in the clone: pip install '.[bench]'"
+        self.missing = "" if found else f"not installed; to install it: {installing('bench')}"
 
     def volumes(self, pairs: Pairs, *, mend: bool = True) -> FloatArray:
         """Return volumes (p,); NaN for pairs with which the package raises an exception."""

@@ -4,7 +4,7 @@ from dataclasses import asdict, fields
 from pathlib import Path
 
 from common.errors import ConfigurationError
-from common.recording.packages import require_packages
+from common.extras import require_packages
 from feelahead.printing.progress import progress
 from feelahead.study.events import Enrolled
 from feelahead.study.folder import TRIALS, read_study

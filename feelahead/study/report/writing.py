@@ -4,8 +4,8 @@ from pathlib import Path
 from typing import Final
 
 from common.errors import ConfigurationError
+from common.extras import require_packages
 from common.files.output_file import output_file
-from common.recording.packages import require_packages
 from feelahead.study.report import summaries
 from feelahead.study.report.contrasts import compare
 from feelahead.study.report.outcomes import Tables

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any, Final, TypeVar
 
 from common.errors import DeviceError, NoDeviceError, NoDriverError, RemoteProtocolError
+from common.extras import installing
 from operator_side.controller.feel import Feel
 from operator_side.controller.state import ControllerState
 from operator_side.dualsense.reports.feature_report import (
@@ -28,6 +29,7 @@ HidBackend = Any
 
 _INSTALL: Final = "pip install --force-reinstall hidapi"
 """Remedy: reinstalls hidapi over another package's module. It works also if feelahead itself is not installed."""
+_WITHOUT: Final = "run without a controller: --device simulated"
 
 _READ_LENGTH: Final = 128  # longer than any report, so that none is cut
 _MAX_DRAINED: Final = 64  # size of the kernel's hidraw queue; more is left for the next read
@@ -47,15 +49,17 @@ def load_backend() -> HidBackend:
     try:
         import hidraw as module  # noqa: PLC0415
     except Exception as error:  # another package's module may raise anything
+        if isinstance(error, ModuleNotFoundError) and error.name == "hidraw":
+            raise NoDriverError("hidapi is not installed", f"{_WITHOUT}; or {installing('operator')}") from error
         raise NoDriverError(
-            f"hidapi cannot be imported ({type(error).__name__}: {error}): {_INSTALL}, after pip uninstall hid if that"
-            " other package is there; or run without a controller: --device simulated"
+            f"hidapi cannot be imported ({type(error).__name__}: {error})",
+            f"{_INSTALL}, after pip uninstall hid if that other package is there; or {_WITHOUT}",
         ) from error
     if not hasattr(module, "device") or not hasattr(module, "enumerate"):
         place = getattr(module, "__file__", None)
         raise NoDriverError(
-            f"the module {module.__name__} at {place} is not hidapi's: uninstall the package that brings it, then"
-            f" {_INSTALL}"
+            f"the module {module.__name__} at {place} is not hidapi's",
+            f"uninstall the package that brings it, then {_INSTALL}",
         )
     return module
 
@@ -149,7 +153,8 @@ class HidDualSense:
             self.close()
             raise NoDeviceError(
                 f"the controller at {self._place} repeats one report, as a dongle does whose controller is off or out"
-                " of reach: press its PS button"
+                " of reach",
+                "press its PS button",
             )
 
     def write(self, feel: Feel, now_s: float) -> None:
@@ -230,8 +235,8 @@ def _ask(handle: HidHandle, path: bytes) -> Identity:
         transport = transport_of_input(first_report)
     except RemoteProtocolError as error:
         raise DeviceError(
-            f"the controller at {os.fsdecode(path)} does not speak as a DualSense does ({error}): plug it in again;"
-            " imitations are not supported"
+            f"the controller at {os.fsdecode(path)} does not speak as a DualSense does ({error})",
+            "plug it in again; imitations are not supported",
         ) from error
     return Identity(
         transport=transport,
@@ -250,8 +255,8 @@ def _first_report(handle: HidHandle, path: bytes) -> bytes:
             return newest
     if not newest:
         raise DeviceError(
-            f"the controller at {os.fsdecode(path)} sends nothing: press its PS button, and plug it in again if that"
-            " does not help"
+            f"the controller at {os.fsdecode(path)} sends nothing",
+            "press its PS button, and plug it in again if that does not help",
         )
     return newest
 
@@ -272,15 +277,15 @@ def _not_opened(path: bytes, reason: str) -> DeviceError:
     denied = os.path.exists(name) and not os.access(name, os.R_OK | os.W_OK)  # noqa: PTH110  # hidapi's names need not be paths
     if denied or "permission denied" in reason.lower():
         return DeviceError(
-            f"no permission to open the controller at {name}: `feelahead doctor` prints the udev rule that grants it,"
-            " and the command that puts it in place"
+            f"no permission to open the controller at {name}",
+            "`feelahead doctor` prints the udev rule that grants it, and the command that puts it in place",
         )
     return DeviceError(
-        f"the controller at {name} cannot be opened ({reason}): close other programs that use it (Steam Input), plug"
-        f" it in again, or run without one: --device simulated"
+        f"the controller at {name} cannot be opened ({reason})",
+        "close other programs that use it (Steam Input), plug it in again, or run without one: --device simulated",
     )
 
 
 def _gone(reason: str) -> DeviceError:
     """Make the error for a controller that no longer answers, with the remedy."""
-    return DeviceError(f"the controller is gone ({reason}): plug it in again, or press its PS button")
+    return DeviceError(f"the controller is gone ({reason})", "plug it in again, or press its PS button")

@@ -31,6 +31,7 @@ from common.command.words import lease_words, link_words, words
 from common.companion.channel import Channel
 from common.companion.process import companion_channel
 from common.errors import RemoteProtocolError
+from common.extras import installing
 from common.protocol.codec import decode_view
 from common.protocol.view_messages import (
     VIEW_NAMES,
@@ -97,7 +98,7 @@ class _Process:
             from operator_side.viewing.console.solids import sphere  # noqa: PLC0415
         except ModuleNotFoundError as error:
             missing = (error.name or "").partition(".")[0]
-            self._give_up(f"{missing} is not installed; install it in the clone: pip install '.[operator]'")
+            self._give_up(f"{missing} is not installed; to install it: {installing('operator')}")
             return
         part = socket.socket()
         part.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)

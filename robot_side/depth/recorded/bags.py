@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from common.errors import ConfigurationError
+from common.extras import installing
 from robot_side.depth.recorded.cloud import Cloud
 from robot_side.depth.recorded.ros_messages import cloud_of
 
@@ -23,7 +24,7 @@ def bag_clouds(path: Path, topic: str | None = None) -> Iterator[tuple[float, Cl
         from rosbags.highlevel import AnyReader, AnyReaderError  # noqa: PLC0415  # optional
         from rosbags.typesys import Stores, get_typestore  # noqa: PLC0415
     except ImportError as error:
-        raise ConfigurationError(f"{path}: {error}; valid: with `pip install '.[recorded]'` in the clone") from error
+        raise ConfigurationError(f"{path}: {error}; to install it: {installing('recorded')}") from error
     try:
         with AnyReader([path], default_typestore=get_typestore(Stores.LATEST)) as reader:
             yield from _clouds(reader, path, topic)

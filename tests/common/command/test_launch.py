@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from common.command.stop_signal import StopSignal
+from common.extras import installing
 from tests.helpers.machines.waiting import LIMIT_S
 from tests.helpers.python_process import ended, start
 from tests.helpers.repository import ROOT
@@ -111,7 +112,7 @@ main()
 def test_a_machine_without_mujoco_is_told_what_to_install() -> None:
     code, _, complaint = ended("-c", WITHOUT_MUJOCO)
     assert code == 2
-    assert complaint == ("feelahead-robot: mujoco is not installed; install it in the clone: pip install '.[robot]'\n")
+    assert complaint == f"feelahead-robot: mujoco is not installed; to install it: {installing('robot')}\n"
 
 
 @pytest.mark.processes

@@ -128,11 +128,12 @@ def test_controllers_are_looked_at_and_left_alone(monkeypatch: pytest.MonkeyPatc
     assert [one.said for one in controllers.controllers_seen()] == ["none is connected (the demo simulates one)"]
 
     def missing() -> None:
-        raise NoDriverError("hidapi cannot be imported (no): pip install it")
+        raise NoDriverError("hidapi cannot be imported (ImportError: libudev.so.1: no)", "pip: install it")
 
     monkeypatch.setattr(controllers, "load_backend", missing)
     [finding] = controllers.controllers_seen()
-    assert (finding.verdict, finding.remedy) == (NOTE, "pip install it")
+    assert (finding.verdict, finding.remedy) == (NOTE, "pip: install it")
+    assert finding.said.endswith("(ImportError: libudev.so.1: no)")
 
 
 def test_a_second_writer_is_a_note_with_its_remedy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -101,5 +101,5 @@ def test_what_needs_more_packages_names_them(monkeypatch: pytest.MonkeyPatch) ->
         raise ModuleNotFoundError(name="statsmodels")
 
     monkeypatch.setattr("feelahead.commands.study.command.import_module", missing)
-    with pytest.raises(ConfigurationError, match=r"statsmodels is not installed; in the clone: pip install '\.\["):
+    with pytest.raises(ConfigurationError, match=r"statsmodels is not installed; to install it: pip install '\.\["):
         study(["plan", str(EXAMPLE)])

@@ -89,6 +89,12 @@ def test_the_installed_hidapi_is_taken() -> None:
     assert load_backend() is pytest.importorskip("hidraw")
 
 
+def test_a_missing_hidapi_comes_with_its_extra(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "hidraw", None)
+    with pytest.raises(NoDriverError, match=r"^hidapi is not installed: .*pip install .*\[operator\]"):
+        load_backend()
+
+
 def test_another_package_of_that_name(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "hidraw", types.ModuleType("hidraw"))
     with pytest.raises(NoDriverError, match="is not hidapi's: uninstall the package that brings it"):

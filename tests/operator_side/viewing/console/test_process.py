@@ -20,6 +20,7 @@ from websockets.asyncio.client import ClientConnection, connect
 from websockets.typing import Origin, Subprotocol
 
 from common.clock import MonotonicClock
+from common.extras import installing
 from common.protocol.codec import encode
 from common.protocol.messages import Header
 from common.protocol.view_messages import VIEW_NAMES, VideoStep
@@ -270,7 +271,7 @@ def test_a_port_that_is_taken_is_said() -> None:
     [
         (
             "raise ModuleNotFoundError('No module', name='viser')",
-            "no console: viser is not installed; install it in the clone: pip install '.[operator]'",
+            f"no console: viser is not installed; to install it: {installing('operator')}",
         ),
         (
             # As another version of viser, which opens its server differently, would do.

@@ -240,5 +240,5 @@ def test_other_files_are_refused_by_what_is_valid(tmp_path: Path) -> None:
 
 def test_a_bag_without_rosbags_says_how_to_get_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "rosbags.highlevel", None)
-    with pytest.raises(ConfigurationError, match=r"rosbags.*; valid: with `pip install '.\[recorded\]'` in the clone"):
+    with pytest.raises(ConfigurationError, match=r"rosbags.*; to install it: pip install '.\[recorded\]'"):
         only(tmp_path)
