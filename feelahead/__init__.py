@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from robot_side.tick.sensed import Sensed
     from robot_side.tick.situation import Situation
 
+    __version__: str
+
 _PLACES: Final = {
     "Arm": "robot_side.arm.port",
     "Controller": "operator_side.controller.port",
@@ -80,6 +82,10 @@ _require_own_common()
 
 
 def __getattr__(name: str) -> Any:
+    if name == "__version__":
+        from importlib.metadata import version  # noqa: PLC0415  # loads the library for electronic mail
+
+        return version("feelahead")
     if name not in _PLACES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}; valid: {', '.join(__all__)}")
     module = import_module(_PLACES[name])

@@ -107,7 +107,7 @@ def opening_of(name: str, given: OpeningParts) -> Opening:
     opens = find("controller", name, DEVICES)
     if not callable(opens):
         raise ConfigurationError(
-            f"controller {name}: is a {type(opens).__name__}; valid: a function or class that opens one"
+            f"controller {name}: is of type {type(opens).__name__}; valid: a function or class that opens one"
         )
     return Opening(BackgroundSearch(functools.partial(_open, name, opens)))
 

@@ -219,7 +219,7 @@ def _one_line(box: str, program: str, settings_type: type) -> str:
             words += text.split()
     said = " ".join(words).removeprefix("Error parsing ")
     said = re.sub(r"^[A-Z]\w*: ", "", said)  # the class that checked
-    said = re.sub(r"'None', |, 'None'", "", said)  # what an unset flag has
+    said = re.sub(r"\(([^()]*'None'[^()]*)\)", _given_choices, said)
     if named := re.match(r"(?:([\w.]+): )?(\w+) = ", said):
         place = f"{named[1]}.{named[2]}" if named[1] else named[2]
         if place.partition(".")[0] in get_type_hints(settings_type):
@@ -240,6 +240,11 @@ def _one_line(box: str, program: str, settings_type: type) -> str:
         if kind in said:
             return f"{_shortened(said)}; valid: {valid}"
     return f"{_shortened(said)} (valid flags and values: {program} --help)"
+
+
+def _given_choices(of: re.Match[str]) -> str:
+    """Return the choices of an optional flag, in one order; tyro's order varies, and has what an unset flag has."""
+    return f"({', '.join(sorted(set(of[1].split(', ')) - {repr('None')}))})"
 
 
 def _shortened(text: str) -> str:

@@ -25,7 +25,7 @@ def tick_period_s(text: str) -> float:
     period_s = parse_duration(text, "--tick-period")
     if not PERIODS_S[0] <= period_s <= PERIODS_S[-1]:
         valid = f"{period_text(PERIODS_S[0])} to {period_text(PERIODS_S[-1])}"
-        raise ConfigurationError(f"--tick-period {text}: is out of range; valid: {valid}")
+        raise ConfigurationError(f"--tick-period {text} is out of range; valid: {valid}")
     return period_s
 
 
@@ -69,12 +69,12 @@ class RunOptions:
         self.link_spec()
         if abs(self.asymmetry_s()) > _LARGEST_ASYMMETRY_S:
             raise ValueError(
-                f"--asymmetry {self.asymmetry}: is out of range;"
+                f"--asymmetry {self.asymmetry} is out of range;"
                 f" valid: -{_LARGEST_ASYMMETRY_S:g}s to {_LARGEST_ASYMMETRY_S:g}s"
             )
         self.tick_period_s()
         if self.duration is not None and not 0.0 < self.duration < 1e6:
-            raise ValueError(f"--duration {self.duration}: is out of range; valid: above 0 and below 1000000 seconds")
+            raise ValueError(f"--duration {self.duration} is out of range; valid: above 0 and below 1000000 seconds")
         if self.seed < 0:
             raise ValueError(f"--seed {self.seed}: is negative; valid: 0 or a larger whole number")
         require_output_file("--summary", self.summary)

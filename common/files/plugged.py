@@ -114,7 +114,9 @@ def made_of(kind: str, given: object, simulated: Any, methods: Mapping[str, str]
         return simulated
     makes = find(kind, str(given), {}) if isinstance(given, str | Path) else given
     if not callable(makes):
-        raise ConfigurationError(f"{kind}: is a {type(makes).__name__}; valid: a function that takes the simulated one")
+        raise ConfigurationError(
+            f"{kind}: is of type {type(makes).__name__}; valid: a function that takes the simulated one"
+        )
     try:
         part = makes(simulated)
     except Exception as error:  # anybody's code
@@ -165,9 +167,11 @@ def _package(point: EntryPoint) -> str:
 
 def fault_in_words(error: BaseException) -> str:
     """Return an error of somebody's code in one line, with the last line of theirs that led to it."""
-    said = " ".join(str(error).split()) or "no reason given"
-    line = getattr(error, "lineno", None)
-    where = _line_of(error) if line is None else f", line {line}"
+    if isinstance(error, SyntaxError):
+        said, where = error.msg, f", {Path(error.filename or '').name} line {error.lineno}"
+    else:
+        said, where = str(error), _line_of(error)
+    said = " ".join(said.split()) or "no reason given"
     return f"{type(error).__name__}{where}: {said}"[:_LONGEST_FAULT]
 
 

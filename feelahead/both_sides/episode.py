@@ -14,6 +14,7 @@ import numpy.typing as npt
 from common.arrays import FloatArray
 from common.emulation.spec import LinkSpec
 from common.errors import ConfigurationError, FeelaheadError
+from common.extras import require_packages
 from common.link_model import LinkProfile
 from common.protocol.view_messages import VIEW_NAMES, ViewName
 from feelahead.both_sides.episode_hands import hands_of, why_not_armed
@@ -250,6 +251,7 @@ class Episode:
 
         wall_clock_s: time of day, in seconds since 1970, at the start.
         """
+        require_packages(f"record {path}", "foxglove", "mcap")
         from feelahead.both_sides.episode_recording import EpisodeRecording  # noqa: PLC0415  # needs mcap
 
         if self.time_s > 0.0:

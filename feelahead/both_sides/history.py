@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from common.arrays import BoolArray, FloatArray
+from common.extras import require_packages
 from robot_side.tick import events
 from robot_side.tick.events import Listener
 
@@ -81,6 +82,7 @@ class History:
 
     def to_pandas(self) -> Any:
         """Return a pandas.DataFrame with a column a number, such as `tool_position_m_x` or `strengths_r2_10`."""
+        require_packages("to_pandas", "pandas", extra="study")
         import pandas as pd  # noqa: PLC0415  # its users have it
 
         columns: dict[str, Any] = {}

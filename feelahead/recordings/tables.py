@@ -15,6 +15,7 @@ import numpy as np
 
 from common.arrays import FloatArray
 from common.errors import ConfigurationError, RemoteProtocolError
+from common.extras import require_packages
 from common.recording.entries import Entry, Kind, unpack_block
 from common.recording.reading import Recording
 from feelahead.recordings.controller import read_value
@@ -112,6 +113,7 @@ class Joined:
 
 
 def _frame(table: "Table | Joined", times_s: Sequence[float] | FloatArray) -> Any:
+    require_packages("to_pandas", "pandas", extra="study")
     import pandas as pd  # noqa: PLC0415  # its users have it
 
     values = {name: list(table.values(name)) for name in table.columns()}

@@ -87,7 +87,7 @@ class ArmingHands:
             raise FeelaheadError(f"person {type(self.person).__name__}: {fault_in_words(error)}") from error
         if not isinstance(hands, FingerInput | None):
             raise FeelaheadError(
-                f"person {type(self.person).__name__}: act returned a {type(hands).__name__}; valid: a FingerInput, or"
+                f"person {type(self.person).__name__}: act returned {type(hands).__name__}; valid: a FingerInput, or"
                 " None when the person has finished"
             )
         if hands is None:

@@ -38,7 +38,7 @@ class OwnArm(Arm):
         """Return its state; FeelaheadError if it returns none."""
         state = self._call("state", now_s)
         if not isinstance(state, ArmState):
-            raise FeelaheadError(f"{self._name}: state returned a {type(state).__name__}; valid: an ArmState")
+            raise FeelaheadError(f"{self._name}: state returned {type(state).__name__}; valid: an ArmState")
         return state
 
     def give_way(self, clock: Clock) -> None:

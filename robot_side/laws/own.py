@@ -25,8 +25,8 @@ class OwnLaw:
         makes = isinstance(given, type) or not hasattr(given, "sense")
         if makes and not callable(given):
             raise ConfigurationError(
-                f"law {name}: is a {type(given).__name__}; valid: a class or function that takes a LawInputs, or an"
-                " object with sense(situation, now_s)"
+                f"law {name}: is of type {type(given).__name__}; valid: a class or function that takes a LawInputs, or"
+                " an object with sense(situation, now_s)"
             )
         try:
             self._law = given(inputs) if makes else given
@@ -41,7 +41,7 @@ class OwnLaw:
         sensed = self._call("sense", situation, now_s)
         if not isinstance(sensed, Sensed):
             raise FeelaheadError(
-                f"law {self._name}: sense returned a {type(sensed).__name__}; valid: a Sensed, as inputs.sensed makes"
+                f"law {self._name}: sense returned {type(sensed).__name__}; valid: a Sensed, as inputs.sensed makes"
             )
         return sensed
 

@@ -24,7 +24,7 @@ class OwnPerception:
             raise FeelaheadError(f"perception {type(self._part).__name__}: {fault_in_words(error)}") from error
         if not isinstance(frame, PerceivedObjects):
             raise FeelaheadError(
-                f"perception {type(self._part).__name__}: perceive returned a {type(frame).__name__}; valid: a"
+                f"perception {type(self._part).__name__}: perceive returned {type(frame).__name__}; valid: a"
                 " PerceivedObjects, such as the simulated camera's"
             )
         return frame

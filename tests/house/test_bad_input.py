@@ -141,8 +141,9 @@ def test_one_line_names_the_value_and_what_is_valid(
     assert valid in text
 
 
-def test_an_unset_flag_is_no_choice() -> None:
+def test_an_unset_flag_is_no_choice_and_choices_have_one_order() -> None:
     assert "None" not in complaint("feelahead controller --pattern hill")
+    assert "one of ('shelf', 'slot', 'table', 'wall')." in complaint("feelahead demo --scene wal")
 
 
 @pytest.mark.processes

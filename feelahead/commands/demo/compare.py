@@ -1,6 +1,7 @@
 """`feelahead demo --compare`: one seed without and with haptics, in virtual time, then side by side on a page."""
 
 import errno
+import secrets
 import sys
 from collections.abc import Collection, Mapping
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
@@ -39,7 +40,11 @@ def compare(settings: DemoSettings, given: Collection[str]) -> int:
     given: fields that a person set; ConfigurationError for one without a meaning here.
     """
     refuse_others(given)
-    runs = compute(settings)
+    try:
+        runs = compute(settings)
+    except KeyboardInterrupt:
+        sys.stderr.write("feelahead demo --compare: interrupted\n")
+        return 130
     person = "a simulated person who misjudges depth, in virtual time"
     sys.stdout.write(f"feelahead demo --compare: {_what(settings)}; {person}\n")
     Console().print(_table(runs))
@@ -128,7 +133,8 @@ def _cells(figures: Mapping[str, Any]) -> list[str | float | None]:
 
 
 def _serve(page: bytes, port: int) -> None:
-    """Serve the page on this machine until a stop signal."""
+    """Serve the page on this machine until a stop signal, at an address that other users cannot guess."""
+    place = f"/{secrets.token_urlsafe(24)}/"
 
     class Handler(BaseHTTPRequestHandler):
         """Answers with the page."""
@@ -137,7 +143,7 @@ def _serve(page: bytes, port: int) -> None:
 
         def do_GET(self) -> None:
             """Send the page, or 404 for another path."""
-            if self.path != "/":
+            if not secrets.compare_digest(self.path.encode(), place.encode()):
                 self.send_error(404)
                 return
             self.send_response(200)
@@ -157,7 +163,7 @@ def _serve(page: bytes, port: int) -> None:
         raise ConfigurationError(f"--console-port {port}: {error.strerror}; valid: a free port, or 0") from error
     with server, StopSignal() as stop, Status("line", "feelahead demo") as status:
         server.timeout = 0.2
-        show_address(f"http://127.0.0.1:{server.server_port}/", status)
+        show_address(f"http://127.0.0.1:{server.server_port}{place}", status)
         status.note("it plays both runs at real speed; Ctrl-C ends it")
         while not stop.is_set:
             server.handle_request()

@@ -45,7 +45,7 @@ class Recorded:
         """Return a new law with the settings of the run, as it was at the run's start."""
         law = Episode(robot=self.settings, sampled=False).parts.law
         if not isinstance(law, SweptLaw):
-            raise TypeError(f"law is a {type(law).__name__}; valid: a SweptLaw")
+            raise TypeError(f"law is of type {type(law).__name__}; valid: a SweptLaw")
         # Fields along the triggers alone; contact distances from around are not computed.
         law.looking.probes = None
         return law

@@ -55,7 +55,7 @@ class MeshLibrary:
             raise ValueError("meshes is empty; valid: one mesh or more")
         for index, mesh in enumerate(meshes):
             if not isinstance(mesh, Mesh):
-                raise ValueError(f"meshes[{index}] is a {type(mesh).__name__}; valid: a Mesh")
+                raise ValueError(f"meshes[{index}] is of type {type(mesh).__name__}; valid: a Mesh")
         self.tables = joined([mesh.tables for mesh in meshes])
 
     def __len__(self) -> int:

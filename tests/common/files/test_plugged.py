@@ -79,7 +79,7 @@ def test_what_is_installed_is_told_with_its_fault(package: None) -> None:
     [
         ("none.py", None, "there is no such file; valid: a Python file that defines law"),
         ("empty_law.py", "", "the file defines no law; valid: a Python file that defines law"),
-        ("wrong_law.py", "law = (\n", "SyntaxError, line 1: '(' was never closed (wrong_law.py, line 1)"),
+        ("wrong_law.py", "law = (\n", "SyntaxError, wrong_law.py line 1: '(' was never closed"),
         ("failing_law.py", "\n1 / 0\n", "ZeroDivisionError, failing_law.py line 2: division by zero"),
     ],
 )
@@ -117,7 +117,7 @@ def test_what_lacks_a_method_is_named_with_all_that_it_lacks() -> None:
     methods = {"perceive": "now_s"}
     assert made_of("perception", None, "simulated", methods) == "simulated"
     for given, said in (
-        (3, "is a int; valid: a function that takes the simulated one"),
+        (3, "is of type int; valid: a function that takes the simulated one"),
         (lambda camera: camera / 0, "TypeError, test_plugged.py line"),
         (lambda camera: camera, "str lacks perceive"),
     ):

@@ -1,5 +1,7 @@
 """Episodes as a script of somebody's runs them, and what a wrong argument is told."""
 
+import sys
+import tomllib
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
@@ -18,7 +20,7 @@ from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from robot_side.compiled import warm_up
 from robot_side.settings import CameraSettings
 from robot_side.surroundings.perceived import ObjectSource, PerceivedObjects
-from tests.helpers.repository import DATA
+from tests.helpers.repository import DATA, ROOT
 from tests.robot_side.compiled.fresh_kernels import fresh_kernels
 
 WALL: dict[str, Any] = {"scene": "wall", "link": "delay 100ms", "seed": 3}
@@ -151,7 +153,7 @@ def test_the_scripted_person_does_the_task_and_says_that_it_is_done() -> None:
     [
         ({"law": "swep"}, "law 'swep': there is no such law; valid: swept, paper"),
         ({"law": Path("none.py")}, "law none.py: there is no such file; valid: a Python file that defines law"),
-        ({"law": 3}, "law int: is a int; valid: a class or function that takes a LawInputs"),
+        ({"law": 3}, "law int: is of type int; valid: a class or function that takes a LawInputs"),
         ({"law": lambda inputs: inputs}, "LawInputs lacks sense(situation, now_s)"),
         ({"law": lambda inputs: inputs.none}, "cannot be made from the law's inputs: AttributeError"),
         ({"scene": "wal"}, 'scene = "wal"; valid: "table" or "wall" or "slot" or "shelf"'),
@@ -163,10 +165,10 @@ def test_the_scripted_person_does_the_task_and_says_that_it_is_done() -> None:
             "Episode: probabilty: no such setting (perhaps probability); valid: arm, arm_fastest_m_s, ",
         ),
         ({"link": "delay x"}, "delay: 'x' is no duration"),
-        ({"link": 0.1}, "Episode: link is a float; valid: netem's words, a LinkProfile, or LinkProfiles by name"),
+        ({"link": 0.1}, "Episode: link is of type float; valid: netem's words, a LinkProfile, or a mapping of these"),
         ({"probability": 1.0}, "probability"),
         ({"person": object()}, "person: object lacks act(seen)"),
-        ({"perception": 3}, "perception: is a int; valid: a function that takes the simulated one"),
+        ({"perception": 3}, "perception: is of type int; valid: a function that takes the simulated one"),
         ({"arm": lambda _: None}, "arm: NoneType lacks command(joint_velocity_rad_s, valid_until_s)"),
     ],
 )
@@ -179,7 +181,7 @@ def test_a_wrong_argument_is_refused_at_once_with_what_is_valid(given: dict[str,
 @pytest.mark.parametrize(
     ("given", "said"),
     [
-        ({"perception": Failing}, r"^perception Failing: perceive returned a MujocoCamera; valid: a PerceivedObjects"),
+        ({"perception": Failing}, r"^perception Failing: perceive returned MujocoCamera; valid: a PerceivedObjects"),
         ({"perception": lambda _: Failing()}, r"^perception Failing: ZeroDivisionError, test_episode.py line \d+: "),
         (
             {"law": lambda _: Failing()},
@@ -187,13 +189,13 @@ def test_a_wrong_argument_is_refused_at_once_with_what_is_valid(given: dict[str,
         ),
         (
             {"law": lambda _: Failing(3)},
-            r"^law <lambda>: sense returned a int; valid: a Sensed",
+            r"^law <lambda>: sense returned int; valid: a Sensed",
         ),
         (
             {"person": Failing},
             r"^person Failing: ZeroDivisionError, test_episode.py line \d+: division by zero",
         ),
-        ({"person": lambda: Failing(3)}, r"^person Failing: act returned a int; valid: a FingerInput"),
+        ({"person": lambda: Failing(3)}, r"^person Failing: act returned int; valid: a FingerInput"),
     ],
 )
 def test_a_part_that_fails_ends_the_run_with_its_name_and_line(given: dict[str, Any], said: str) -> None:
@@ -337,3 +339,19 @@ def test_compiling_is_said_once_and_not_where_the_kernels_are_kept(
         Episode(**WALL)
         said.append(capsys.readouterr().err)
     assert said == [f"feelahead: {warm_up.COMPILING}\n", "", ""]
+
+
+def test_an_extra_that_is_missing_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    episode = Episode(**WALL)
+    monkeypatch.setitem(sys.modules, "foxglove", None)
+    with pytest.raises(ConfigurationError, match=r"foxglove is not installed; .*\[record\]"):
+        episode.record(tmp_path / "run.mcap")
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    history = episode.step(0.1).history
+    with pytest.raises(ConfigurationError, match=r"^to_pandas: pandas is not installed; .*\[study\]"):
+        history.to_pandas()
+
+
+def test_the_version_is_that_of_the_project() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    assert feelahead.__version__ == project["version"]

@@ -65,7 +65,7 @@ def test_a_sides_file_is_checked_before_a_side_is_started(flag: str, tmp_path: P
     ("flags", "written", "said"),
     [
         ("--law part.py", None, "law part.py: there is no such file; valid: a Python file that defines law"),
-        ("--law part.py", "law = (", "law part.py: SyntaxError, line 1: '(' was never closed"),
+        ("--law part.py", "law = (", "law part.py: SyntaxError, part.py line 1: '(' was never closed"),
         ("--law part.py", "x = 1", "law part.py: the file defines no law"),
         ("--law part.py", "import no_such", "law part.py: ModuleNotFoundError, part.py line 1: No module"),
         ("--person-file part.py", "person = 3", "person: int lacks act"),

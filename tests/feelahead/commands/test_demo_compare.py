@@ -1,11 +1,17 @@
 """The comparison of a run without and with haptics: what it refuses, computes and shows."""
 
 import json
+import os
+import signal
+import threading
+import urllib.error
+import urllib.request
 from pathlib import Path
 
 import pytest
 
 from common.errors import ConfigurationError
+from feelahead.commands.demo import compare
 from feelahead.commands.demo.command import demo
 from feelahead.commands.demo.compare import page_of
 from feelahead.commands.demo.settings import DemoSettings
@@ -40,3 +46,33 @@ def test_no_text_ends_the_pages_script() -> None:
     assert page.count("</script>") == 1
     assert "<b>" not in page
     assert "<!--" not in page
+
+
+def test_the_page_is_only_at_its_address(monkeypatch: pytest.MonkeyPatch) -> None:
+    answers: list[bytes | int] = []
+
+    def ask(address: str) -> None:
+        for asked in (address, address.rsplit("/", 2)[0] + "/", address[:-1] + "x/"):
+            try:
+                with urllib.request.urlopen(asked, timeout=20.0) as answer:  # noqa: S310
+                    answers.append(answer.read())
+            except urllib.error.HTTPError as error:
+                answers.append(error.code)
+                error.close()
+        os.kill(os.getpid(), signal.SIGINT)
+
+    def shown(address: str, _: object) -> None:
+        threading.Thread(target=ask, args=(address,)).start()
+
+    monkeypatch.setattr(compare, "show_address", shown)
+    compare._serve(b"page", 0)
+    assert answers == [b"page", 404, 404]
+
+
+def test_ctrl_c_while_it_computes_is_said(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    def interrupted(_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(compare, "compute", interrupted)
+    assert demo(["--compare"]) == 130
+    assert capsys.readouterr().err == "feelahead demo --compare: interrupted\n"

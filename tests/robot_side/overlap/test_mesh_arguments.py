@@ -120,7 +120,7 @@ def test_parts_are_told_apart_however_many() -> None:
 def test_a_meshes_tables_cannot_be_changed() -> None:
     with pytest.raises(ValueError, match="read-only"):
         Mesh(TETRAHEDRON, TETRAHEDRON_TRIANGLES).tables.triangles[0, 0] = 5.0
-    with pytest.raises(ValueError, match=re.escape("meshes[0] is a NoneType")):
+    with pytest.raises(ValueError, match=re.escape("meshes[0] is of type NoneType")):
         MeshLibrary([None])  # type: ignore[list-item]
     with pytest.raises(ValueError, match="meshes is empty"):
         MeshLibrary([])
