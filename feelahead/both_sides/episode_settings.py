@@ -51,7 +51,7 @@ def link_clauses(link: LinkProfile | Mapping[str, LinkProfile]) -> Mapping[str, 
     clauses = {"": link} if isinstance(link, LinkProfile) else link
     if not isinstance(clauses, Mapping) or not all(isinstance(one, LinkProfile) for one in clauses.values()):
         raise ConfigurationError(
-            f"Episode: link is of type {type(link).__name__}; valid: netem's words, a LinkProfile, or a mapping of these"
+            f"Episode: link is of type {type(link).__name__}; valid: netem's words, a LinkProfile, or these by name"
         )
     if unknown := clauses.keys() - set(clause_names()):
         valid = ", ".join(filter(None, clause_names()))

@@ -165,7 +165,7 @@ def test_the_scripted_person_does_the_task_and_says_that_it_is_done() -> None:
             "Episode: probabilty: no such setting (perhaps probability); valid: arm, arm_fastest_m_s, ",
         ),
         ({"link": "delay x"}, "delay: 'x' is no duration"),
-        ({"link": 0.1}, "Episode: link is of type float; valid: netem's words, a LinkProfile, or a mapping of these"),
+        ({"link": 0.1}, "Episode: link is of type float; valid: netem's words, a LinkProfile, or these by name"),
         ({"probability": 1.0}, "probability"),
         ({"person": object()}, "person: object lacks act(seen)"),
         ({"perception": 3}, "perception: is of type int; valid: a function that takes the simulated one"),

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from common import extras
 from common.errors import ConfigurationError
-from common.recording import packages
 from common.recording.content import Content
 from common.recording.mcap_file import RecordingFile
 from common.recording.reading import open_recording
@@ -108,7 +108,7 @@ def test_where_nothing_can_be_recorded(tmp_path: Path, name: str, told: str) -> 
 
 
 def test_without_the_extra_the_command_that_mends_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(packages, "find_spec", lambda _: None)
+    monkeypatch.setattr(extras, "find_spec", lambda _: None)
     for command, arguments in ((demo, ["--record", str(tmp_path / "run.mcap")]), (replay, ["run.mcap"])):
         with pytest.raises(ConfigurationError, match=r"pip install '.\[record\]'"):
             command(arguments)

@@ -8,8 +8,8 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
+from common import extras
 from common.errors import ConfigurationError
-from common.recording import packages
 from feelahead.study.folder import MADE_ANEW
 from feelahead.study.report import summaries
 from feelahead.study.report.contrasts import compare
@@ -88,6 +88,6 @@ def test_a_study_in_which_nothing_was_done_has_a_page(tmp_path: Path) -> None:
 
 
 def test_without_the_extra_one_line_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(packages, "find_spec", lambda name: None if name == "statsmodels" else find_spec(name))
+    monkeypatch.setattr(extras, "find_spec", lambda name: None if name == "statsmodels" else find_spec(name))
     with pytest.raises(ConfigurationError, match=r"^study report: statsmodels is not installed; .*\[study\]'$"):
         write_report(made_up(people=1), tmp_path)
