@@ -1,5 +1,6 @@
 """Episodes as a script of somebody's runs them, and what a wrong argument is told."""
 
+import re
 import sys
 import tomllib
 from dataclasses import fields
@@ -355,3 +356,24 @@ def test_an_extra_that_is_missing_is_named(tmp_path: Path, monkeypatch: pytest.M
 def test_the_version_is_that_of_the_project() -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     assert feelahead.__version__ == project["version"]
+
+
+def test_the_guides_names_are_there() -> None:
+    seen: dict[str, Any] = {}
+
+    class Watching(Nearest):
+        """Law that keeps what it is given."""
+
+        def sense(self, situation: Situation, now_s: float) -> Sensed:
+            seen.update(inputs=self.inputs, situation=situation)
+            return super().sense(situation, now_s)
+
+    episode = Episode(scene="wall", seed=3, link="delay 1ms", haptics=False, law=Watching).arm().step(4.0, r2_n=2.0)
+    seen |= {"contact": episode.contacts[0], "summary": episode.summary()}
+    _, _, guide = (ROOT / "docs" / "python.md").read_text(encoding="utf-8").partition("\n## Names\n")
+    names = re.findall(rf"`((?:{'|'.join(seen)})\.[\w.]+)`", guide)
+    assert len(names) > 30
+    for name in names:
+        found: Any = seen
+        for part in name.split("."):
+            found = found[part] if isinstance(found, dict) else getattr(found, part)
