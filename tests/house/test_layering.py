@@ -148,10 +148,10 @@ ARROWS = """
     feelahead/recordings: common/* robot_side/* operator_side/*
     feelahead/containers: common/* feelahead/both_sides
     feelahead/workers.py: common
-    feelahead/printing: common common/recording
+    feelahead/printing: common
     feelahead/lab: common/* robot_side/* operator_side/* feelahead/both_sides feelahead/containers feelahead/printing
         feelahead/workers.py
-    feelahead/study/report: common common/files common/recording feelahead/printing feelahead/study
+    feelahead/study/report: common common/files feelahead/printing feelahead/study
         feelahead/study/trials
     feelahead/study: common common/command common/files robot_side/drivers/mujoco robot_side/laws/named.py
     feelahead/commands/bench_and_try.py: common common/files feelahead/lab
@@ -217,7 +217,7 @@ LIBRARIES = {
 """Rooms and files that may import each library, or use a clock"""
 
 
-PLAN = {"common": (29, 53, 7), "robot_side": (25, 100, 12), "operator_side": (20, 70, 9)}
+PLAN = {"common": (30, 56, 7), "robot_side": (25, 100, 12), "operator_side": (20, 70, 9)}
 """Most rooms, arrows and floors of a package. Here each file or folder directly in the package is a room.
 
 Arrow: some file of one room imports a file of the other. Floors: rooms in the longest chain of arrows.
