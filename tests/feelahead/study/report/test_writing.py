@@ -89,5 +89,5 @@ def test_a_study_in_which_nothing_was_done_has_a_page(tmp_path: Path) -> None:
 
 def test_without_the_extra_one_line_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(extras, "find_spec", lambda name: None if name == "statsmodels" else find_spec(name))
-    with pytest.raises(ConfigurationError, match=r"^study report: statsmodels is not installed; .*\[study\]'  # in the clone$"):
+    with pytest.raises(ConfigurationError, match=r"^study report: statsmodels is not installed; .*\[study\]'  # in"):
         write_report(made_up(people=1), tmp_path)
