@@ -144,7 +144,7 @@ figures/haptics_depth.csv: asks = try haptics --perception depth --scenes wall s
 figures/overlap.csv: asks = bench overlap --peer-header overlap.hpp --picture docs/benchmarks/overlap.png
 figures/accuracy.csv: asks = bench accuracy --quick --peer-header overlap.hpp --picture docs/benchmarks/accuracy.png
 figures/stability.csv: asks = bench stability --quick
-figures/shared.csv: asks = bench felt --shared
+figures/shared.csv: asks = bench felt --shared --quick
 figures/tiles.csv: asks = bench felt --tiles
 FIGURES = $(patsubst %,figures/%.csv,haptics camera demo definition tick cover coverage laws error approach depth \
 	haptics_depth overlap accuracy stability shared tiles)
