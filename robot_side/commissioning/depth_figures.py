@@ -18,6 +18,12 @@ NEAR_M: Final = 0.03
 """Distance from the robot's solids within which a measured point counts as one on them"""
 _POINTS: Final = 4000
 """Points of a picture that are held against the solids"""
+_STILL: Final = 0.005
+"""Change of a joint up to which the arm stands, in rad or m"""
+_ANOTHER: Final = 0.05
+"""Change of a joint that makes another pose"""
+_SETTLED_S: Final = 0.2
+_MOST_LOOKS: Final = 30
 _NO_MAP: Final = MapSettings(lower_m=(0.0, 0.0, 0.0), upper_m=(0.1, 0.1, 0.1), slots=64)
 
 
@@ -44,6 +50,20 @@ class PictureFigures:
     """(k,) signed distances of points from the robot's own surface, up to `NEAR_M`"""
 
 
+@dataclass(frozen=True, eq=False)
+class Look:
+    """Picture beside an arm that stands."""
+
+    picture: DepthPicture
+    pose: CameraPose
+    """Pose of the camera as it is believed"""
+    arm: FloatArray
+    """(n,) positions of the arm's joints"""
+    fingers: FloatArray
+    """(f,) positions of the fingers' joints"""
+    errors: DepthErrors
+
+
 class LookedAt(DepthPerception):
     """Stands where a map would, and keeps the figures of each camera's pictures."""
 
@@ -53,11 +73,24 @@ class LookedAt(DepthPerception):
         """Time at which pictures are looked at"""
         self.figures: dict[int, list[PictureFigures]] = {}
         """Figures by the camera's number"""
+        self.looks: dict[int, list[Look]] = {}
+        """One picture from each pose in which the arm stood, by the camera's number"""
+        self._arm = self._fingers = np.empty(0)
+        self._stands_since_s = np.inf
+
+    def stand(self, now_s: float, arm: FloatArray, fingers: FloatArray) -> None:
+        """Take where the joints of arm (n,) and fingers (f,) are."""
+        if len(arm) != len(self._arm) or np.abs(np.subtract(arm, self._arm)).max() > _STILL:
+            self._arm, self._fingers, self._stands_since_s = np.array(arm), np.array(fingers), now_s
 
     def see(self, picture: DepthPicture, pose: CameraPose, body: OwnBody, errors: DepthErrors, camera: int) -> None:
         """Keep the picture's figures."""
         found = figures_of(picture, pose, body, errors, self.now_s)
         self.figures.setdefault(camera, []).append(found)
+        looks = self.looks.setdefault(camera, [])
+        stands = picture.taken_s >= self._stands_since_s + _SETTLED_S
+        if stands and len(looks) < _MOST_LOOKS and all(np.abs(self._arm - one.arm).max() > _ANOTHER for one in looks):
+            looks.append(Look(picture, pose, self._arm, self._fingers, errors))
 
     def changes(self, near_m: FloatArray, *, holds: bool = False) -> SlotChanges:
         """Return that nothing is mapped."""

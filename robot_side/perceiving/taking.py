@@ -77,6 +77,11 @@ class SimulatedPictures:
         """Map of the pictures"""
         return self._rig.perception
 
+    @property
+    def mounted(self) -> dict[str, LinkMount]:
+        """Where the cameras are taken to be, by name"""
+        return self._rig.mounted()
+
     def unknown(self) -> UnknownSpace:
         """Return the space around the tool that nobody has seen."""
         return self._rig.unknown()
@@ -124,6 +129,8 @@ class SentPictures:
         """Solids of known models, and from when on they were there"""
         self.cameras: dict[str, int] = {}
         """Numbers of the cameras whose pictures were mapped, by name"""
+        self.mounted: dict[str, LinkMount] = {}
+        """Where these cameras are taken to be"""
         self._taken_s: dict[str, tuple[float, float]] = {}
         """Earliest and latest time of each camera's newest picture"""
 
@@ -191,6 +198,7 @@ class SentPictures:
             self._remote.refuse("mount", camera, str(error), now_s)
             return False
         number = self.cameras.setdefault(camera, len(self.cameras))
+        self.mounted[camera] = mount
         self.perception.see(taken.picture, pose, self._robot.body(), self._errors, number)
         return True
 

@@ -1,5 +1,6 @@
-"""Robot in the poses of its joints at other times than now: its solids, and where cameras on its links are."""
+"""Robot in the poses of its joints at other times than now: its solids, its surface, and where cameras on it are."""
 
+import copy
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, Final, Self
@@ -15,6 +16,8 @@ from robot_side.drivers.mujoco.robot_model import RobotModel
 from robot_side.surroundings.mount import Mount
 
 WORLD: Final = "world"
+_SHOWN_GROUPS, _HIDDEN_GROUP = 3, 5
+"""Groups of geoms that pictures show, the first ones, and one that they do not"""
 _EXACT: Final = (GeomKind.SPHERE, GeomKind.CAPSULE, GeomKind.ELLIPSOID, GeomKind.CYLINDER, GeomKind.BOX)
 """Kinds of geoms that are taken as they are; a mesh counts as its bounding box"""
 
@@ -57,6 +60,10 @@ class PosedRobot:
         """(k, 16) solids of known models, in the world frame"""
         self._middles_m: FloatArray = np.where(boxed[:, None], model.geom_aabb[self._geoms, :3], 0.0)
         """(g, 3) centres of the solids in their geoms' frames"""
+        # Rays are to meet nothing but the robot.
+        self._alone = copy.copy(model)
+        self._alone.geom_group[np.setdiff1d(np.arange(model.ngeom), self._geoms)] = _HIDDEN_GROUP
+        self._groups = (np.arange(6) < _SHOWN_GROUPS).astype(np.uint8)
 
     def pose(self, arm_positions: FloatArray, finger_positions: FloatArray) -> None:
         """Set the arm's joints (n,) and the fingers' (f,)."""
@@ -85,6 +92,21 @@ class PosedRobot:
         rotation = self._data.xmat[body].reshape(3, 3)
         place_m = self._data.xpos[body] + rotation @ np.array(mount.position_m)
         return CameraPose(place_m, rotation @ mount.axes())
+
+    def surface(self, pose: CameraPose, rays: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return what a camera sees of the robot alone in the present pose, meshes as they are.
+
+        rays (k, 3): directions in the camera's frame with z = 1. Depths (k,), infinite beside the robot, and unit
+        normals (k, 3) in the camera's frame.
+        """
+        count = len(rays)
+        geoms, depths_m, normals = np.empty(count, dtype=np.int32), np.empty(count), np.empty(3 * count)
+        ways = np.ascontiguousarray(rays @ pose.rotation.T).ravel()
+        mujoco.mj_multiRay(
+            *(self._alone, self._data, pose.position_m, ways, self._groups, 1, -1, geoms, depths_m, normals),
+            *(count, mujoco.mjMAXVAL),
+        )
+        return np.where(geoms >= 0, depths_m, np.inf), normals.reshape(-1, 3) @ pose.rotation
 
     def tool_m(self) -> FloatArray:
         """Return the tool's position (3,) in the present pose."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from common.arrays import FloatArray
 from common.roles import Role
-from robot_side.depth.camera_settings import DepthCameraSettings
+from robot_side.depth.camera_settings import DepthCameraSettings, LinkMount
 from robot_side.depth.perception import DepthPerception
 from robot_side.depth.picture import CameraPose, DepthPicture, OwnBody
 from robot_side.depth.sensor_errors import ErrorMaker
@@ -81,6 +81,13 @@ class DepthRig:
         ]
         self.perception = DepthPerception(self._mapped)
         self._under_way: deque[_Taken] = deque()
+
+    def mounted(self) -> dict[str, LinkMount]:
+        """Return where the cameras are taken to be, by name, in the order of their numbers."""
+        return {
+            eye.name: LinkMount(mount.position_m, mount.quaternion, eye.link)
+            for eye, mount in zip(self._eyes, self._believed, strict=True)
+        }
 
     def unknown(self) -> UnknownSpace:
         """Return the space around the tool that nobody has seen."""
