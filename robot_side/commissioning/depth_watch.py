@@ -83,13 +83,14 @@ def watch_depth(one: ArmAlone, seconds: float, say: Callable[[str], None], *, po
             elif poses and one.depth is None and looked.figures:
                 arm_rad = tour_rad[int(max(0.0, 1.0 - (end_s - now_s) / seconds) * _TOUR)]
                 positions[robot.arm_positions] = arm_rad
-            pictures.hear(Joints(measured_s, arm_rad.tobytes(), fingers.tobytes(), b"", positions.tobytes()))
+            joints = arm_rad.tobytes(), fingers.tobytes()
+            pictures.hear(Joints(measured_s, *joints, b"", positions=positions.tobytes()))
             looked.stand(measured_s, arm_rad, fingers)
             looked.now_s, known = now_s, set(looked.figures)
             pictures.step(now_s)
             if poses and (count := sum(map(len, looked.looks.values()))) > kept:
                 kept = count
-                say(f"{kept} pictures of an arm at rest")
+                say(f"pictures of an arm at rest: {kept}")
             new = looked.figures.keys() - known
             if new and not known:
                 end_s = now_s + seconds

@@ -13,7 +13,7 @@ import zmq
 from common.errors import ConfigurationError
 from feelahead.main import command
 from tests.helpers.machines.waiting import LIMIT_S
-from tests.helpers.python_process import start
+from tests.helpers.python_process import ended, start
 
 MOUNT = {"link": "world", "position_m": [0.5, 0.0, 1.5], "quaternion": [0.0, 1.0, 0.0, 0.0]}
 WIDTH, HEIGHT = 160, 120
@@ -58,6 +58,34 @@ def test_the_pictures_of_a_process_are_looked_at() -> None:
     assert said["above: holes"].startswith("25% of the pixels are empty")
     assert "1.40 to 1.40 m are measured" in said["above: range"]
     assert "as its model starts" in said["above: mount"]
+
+
+@pytest.mark.processes
+def test_the_mount_of_a_simulated_camera_is_solved_in_several_poses() -> None:
+    cameras = "--depth-camera.eyes", "fixed", "--depth-camera.mount-error-m", "0.02", "--depth-camera.rate-hz", "5"
+    look = (
+        "-m",
+        "feelahead",
+        "doctor",
+        "--perception",
+        "depth",
+        *cameras,
+        "--solve",
+        "fixed",
+        "--seconds",
+        "10",
+        "--json",
+    )
+    code, told, complaint = ended(*look)
+    if "no depth can be rendered here" in complaint:
+        pytest.skip(complaint.splitlines()[-1])
+    assert told, complaint
+    found = json.loads(told)
+    solved = found["findings"][-1]
+    assert (solved["name"], solved["verdict"]) == ("fixed: solved mount", "ok"), solved
+    assert '[depth.mounts."fixed"]' in found["mount"]
+    assert not any(finding["name"] == "fixed: mount" for finding in found["findings"])
+    assert code in (0, 1)
 
 
 def message(sequence: int) -> dict[str, Any]:

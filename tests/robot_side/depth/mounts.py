@@ -1,4 +1,4 @@
-"""How well the doctor solves a mount: python -m tests.robot_side.depth.mounts, about three minutes on an idle core.
+"""How well the doctor solves a mount: python -m tests.robot_side.depth.mounts, about a minute on an idle core.
 
 Pictures of the built-in arm at its table, by casting rays, with the errors of a D435. The model is exact.
 """
@@ -25,7 +25,7 @@ from tests.robot_side.depth.ray_cast import looking
 HEIGHT, WIDTH = 240, 320
 _FOCAL_PX: Final = 0.5 * HEIGHT / np.tan(np.radians(29.0))
 PINHOLE: Final = Pinhole(_FOCAL_PX, _FOCAL_PX, 0.5 * WIDTH, 0.5 * HEIGHT)
-_SEEDS: Final = range(10)
+_SEEDS: Final = range(5)
 
 
 class Told(NamedTuple):
@@ -121,8 +121,8 @@ def mount_at(position_m: tuple[float, float, float], at_m: tuple[float, float, f
 
 FAR: Final = mount_at((0.4, -1.1, 0.7), (0.2, 0.0, 0.3))
 _POSES: Final = (1, 3, 5, 10)
-_ERRORS: Final = ((5.0, 0.5), (10.0, 0.5), (20.0, 2.0), (40.0, 2.0), (60.0, 3.0), (100.0, 10.0))
-"""Of the believed mount, in mm and degrees"""
+_ERRORS: Final = ((5.0, 0.5), (40.0, 2.0), (80.0, 4.0), (120.0, 12.0))
+"""Of the believed mount, in mm and degrees; besides 20 mm and 2 degrees"""
 
 
 def row(desk: Desk, poses: int, error: tuple[float, float], level: float = 1.0, zeros_deg: float = 0.0) -> str:
@@ -155,8 +155,7 @@ def rows() -> Iterator[tuple[str, str]]:
         yield f"0.6 m, {poses} poses, wrong by 20 mm and 2 deg", row(near, poses, (20.0, 2.0))
         yield f"1.2 m, {poses} poses, wrong by 20 mm and 2 deg", row(far, poses, (20.0, 2.0))
     for error in _ERRORS:
-        for poses in (1, 5):
-            yield f"0.6 m, {poses} poses, wrong by {error[0]:g} mm and {error[1]:g} deg", row(near, poses, error)
+        yield f"0.6 m, 3 poses, wrong by {error[0]:g} mm and {error[1]:g} deg", row(near, 3, error)
     yield "0.6 m, 5 poses, noise times 3", row(near, 5, (20.0, 2.0), 3.0)
     yield "0.6 m, 5 poses, zero offsets of 0.1 deg", row(near, 5, (20.0, 2.0), zeros_deg=0.1)
     yield "1.2 m, 5 poses, zero offsets of 0.1 deg", row(far, 5, (20.0, 2.0), zeros_deg=0.1)
