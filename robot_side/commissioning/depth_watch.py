@@ -57,10 +57,10 @@ def watch_depth(one: ArmAlone, seconds: float, say: Callable[[str], None], *, po
     with ExitStack() as stack:
         remote: RemoteDepth | None = None
         if one.depth is None:
-            pictures: Taking = stack.enter_context(_simulated(one, looked))
+            pictures: Taking = (simulated := stack.enter_context(_simulated(one, looked)))
             eyes = simulated_eyes(scene, one.settings.depth_camera.eyes)
             numbers = {eye.name: number for number, eye in enumerate(eyes)}
-            mounted = pictures.mounted
+            mounted = simulated.mounted
         else:
             remote = RemoteDepth(one.depth, say)
             pictures = sent = _sent(one, remote, looked)

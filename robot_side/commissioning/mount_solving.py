@@ -36,7 +36,7 @@ _SEEN_THROUGH: Final = 0.25
 _PRIOR: Final = np.repeat((0.3, 0.1), 3)
 """Standard deviations, in rad and m, of what no point tells"""
 _SURE_M, _SURE_RAD = 0.005, math.radians(1.0)
-_FAR: Final = "the first guess has to be right within 60 mm and 3°"
+_FAR: Final = "the first guess has to be right within 40 mm and 2°"
 WAYS: Final = ("right in the picture", "down in the picture", "along the view")
 """Axes of a camera in words"""
 _PARTS: Final = slice(0, 3), slice(3, 6)
@@ -115,7 +115,8 @@ class _Sampled:
         places_m, ways = self._rays[seen] * depths_m[seen, None], ways[seen]
         away_m, nearest = cKDTree(places_m).query(self._points_m)
         near = (away_m <= bound_m) & ((self._normals * ways[nearest]).sum(axis=1) >= _ALIKE)
-        return np.column_stack([self._points_m, places_m[nearest], ways[nearest], self._sds_m])[near]
+        found: FloatArray = np.column_stack([self._points_m, places_m[nearest], ways[nearest], self._sds_m])[near]
+        return found
 
 
 def solve_mount(looks: Sequence[Look], robot: PosedRobot) -> Solved | Refused:
@@ -136,7 +137,7 @@ def solve_mount(looks: Sequence[Look], robot: PosedRobot) -> Solved | Refused:
         # What a step leaves of large turns, the next one takes; what no point tells stays as it is.
         slopes = np.hstack([np.cross(points_m - at_m, ways), ways]) / sds_m[:, None]
         slopes, start = np.vstack([slopes, np.diag(1.0 / _PRIOR)]), np.concatenate([off_m / sds_m, np.zeros(6)])
-        best = least_squares(lambda six, a=slopes, b=start: b + a @ six, np.zeros(6), loss="huber", f_scale=_HUBER)
+        best = least_squares(_left, np.zeros(6), loss="huber", f_scale=_HUBER, args=(slopes, start))
         step = Rotation.from_rotvec(best.x[:3]).as_matrix()
         shift_m = shift_m + turn @ (at_m + best.x[3:] - step @ at_m)
         turn = turn @ step
@@ -145,7 +146,7 @@ def solve_mount(looks: Sequence[Look], robot: PosedRobot) -> Solved | Refused:
     judged = np.isfinite(expected_m) & (depths_m > 0.0)
     if (share := float(np.mean((depths_m - expected_m)[judged] > _BEHIND_M))) > _SEEN_THROUGH:
         return Refused(f"{share:.0%} of the robot's surface is seen through: it is not there", _FAR)
-    left = np.abs(start + slopes @ best.x)[:-6]
+    left = np.abs(_left(best.x, slopes, start))[:-6]
     # Residuals may be larger than is allowed for.
     excess = max(1.0, float(np.median(left)) / 0.6745)
     covariance = excess**2 * np.linalg.inv(slopes.T @ slopes)
@@ -157,3 +158,7 @@ def solve_mount(looks: Sequence[Look], robot: PosedRobot) -> Solved | Refused:
     said = f"not determined: {1e3 * sd_m:.0f} mm {way} and {math.degrees(sd_rad):.1f}° about what is {axis}"
     valid = f"standard deviations up to {1e3 * _SURE_M:.0f} mm and {math.degrees(_SURE_RAD):.0f}°"
     return Refused(f"{said}; valid: {valid}", "more poses, and more of the arm: surfaces that face different ways")
+
+
+def _left(six: FloatArray, slopes: FloatArray, start: FloatArray) -> FloatArray:
+    return start + slopes @ six

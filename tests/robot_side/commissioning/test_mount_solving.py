@@ -71,7 +71,7 @@ def test_a_camera_on_the_gripper_that_is_too_near_is_refused() -> None:
     check, lines = mount_check("wrist", looks, mount, wrist.robot, arm_known=True)
     assert (check.good, lines) == (False, None)
     assert "points are on the robot's surface" in check.said
-    assert "within 60 mm and 3°" in str(check.remedy)
+    assert "within 40 mm and 2°" in str(check.remedy)
 
 
 def test_the_lines_are_those_of_a_config_file(tmp_path: Path) -> None:

@@ -100,7 +100,7 @@ class Desk:
         right, found, at_m = self.mount, answer.corrected(believed), answer.at_m
         turn = right.axes().T @ found.axes()
         off_m = turn @ at_m + right.axes().T @ np.subtract(found.position_m, right.position_m) - at_m
-        return Told(off_m, Rotation.from_matrix(turn).magnitude())
+        return Told(off_m, float(Rotation.from_matrix(turn).magnitude()))
 
 
 def cast(model: mujoco.MjModel, data: mujoco.MjData, pose: CameraPose) -> DepthArray:
