@@ -52,7 +52,7 @@ def test_a_way_is_off_by_its_distance_and_in_a_graze_from_its_band() -> None:
 
 @pytest.mark.long
 def test_looks_of_the_demo_are_noted_and_another_law_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
-    recorded = record(DEMO, 6.2)
+    recorded = record(DEMO, 7.0)
     spheres = [len(tick.situation.pose.sphere_radii_m) for tick in recorded.ticks]
     gripped = spheres.index(max(spheres))
     near = replace(recorded, ticks=recorded.ticks[gripped - 200 : gripped + 61])
