@@ -69,7 +69,7 @@ test-kernel: $(VENV)/.installed ## a stock Linux kernel in QEMU drives a virtual
 	$(SUITE) -m kernel tests/kernel
 
 # Needs Python 3.11 on x86_64; pip brings 430 MB at first. As root, peers and drivers have a real-time priority.
-test-arms: $(VENV)/.installed $(VENV)/.kernels ## the drivers for real arms and depth with franka-sim, and with ROS 2's and UR's own clients
+test-arms: $(VENV)/.installed $(VENV)/.kernels ## the drivers for real arms and depth with franka-sim and ROS 2's own client
 	$(SUITE) -m arms tests/arms $(ARGS)
 
 # Minutes, on a machine with nothing else to do: make arms-table ARGS="--peers franka --faults driver"

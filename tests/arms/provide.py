@@ -12,7 +12,7 @@ import pytest
 
 from tests.helpers.machines.debian import cache_folder, run_or_skip
 
-Peer = Literal["franka", "ros2", "ur"]
+Peer = Literal["franka", "ros2"]
 _HERE: Final = Path(__file__).parent
 _MACHINE: Final = ("Linux", "x86_64", (3, 11))
 """Machine and Python of the wheels whose hashes the locks hold"""
