@@ -22,7 +22,7 @@ from feelahead.lab.approaches.pulls import PullKind, make_pull
 from feelahead.lab.approaches.recording import RecordedApproach, record_approach
 from feelahead.lab.approaches.replay import Replay, coasting_s
 from feelahead.lab.approaches.strengths import Draw, Judged
-from feelahead.lab.questions.coverage import QUESTION
+from feelahead.lab.questions.coverage import QUESTION, CoverageSettings
 from feelahead.lab.sweep import ask
 from feelahead.lab.table import Row
 from operator_side.people.port import FingerInput, Pulling
@@ -239,3 +239,14 @@ def test_the_question_is_answered_whole(
     assert "| bell | 200 ms |" in shown
     assert picture.read_bytes().startswith(b"\x89PNG")
     assert len(table.read_text().splitlines()) == 1 + 2
+
+
+def test_each_cell_by_depth_is_a_piece_of_work_of_its_own_and_is_judged_for_a_minute() -> None:
+    settings = CoverageSettings(quick=True, perception="depth", only=("both, noise x2", "wrist, noise x2"))
+    pulls = settings.pulls()
+    assert {len(one.cells) for one in pulls} == {1}
+    assert {one.judged_s for one in pulls} == {60.0}
+    names = [cell.key(one.pull, one.link) for one in pulls for cell in one.cells]
+    assert len({*names}) == len(names) == 18
+    shared = CoverageSettings(quick=True).pulls()
+    assert max(len(one.cells) for one in shared) > 1
