@@ -37,6 +37,7 @@ from common.protocol.messages import (
 from common.protocol.session import SessionState
 from common.protocol.uniform_field import FAR_M, STRENGTHS, uniform_field
 from common.protocol.view_messages import AnyViewMessage, SceneShapes, Shape, VideoFrame, VideoStep
+from tests.helpers.hostile.spoiled import nested
 from tests.helpers.messages import field, onsets, scene_state, uniform_update
 
 HEADER = Header(epoch=1, sequence=2, sent_s=3.0)
@@ -263,13 +264,6 @@ def survives(hostile: bytes) -> AnyMessage | None:
         return None
     assert decode(encode(message)) == message
     return message
-
-
-nested = st.recursive(
-    st.none() | st.booleans() | st.integers(-(2**63), 2**64 - 1) | st.floats() | st.text(max_size=8) | st.binary(),
-    lambda inner: st.lists(inner, max_size=6) | st.dictionaries(st.text(max_size=4), inner, max_size=4),
-    max_leaves=20,
-)
 
 
 @given(st.binary(max_size=200) | nested.map(lambda content: msgpack.packb([PROTOCOL_VERSION, content])))

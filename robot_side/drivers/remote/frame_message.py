@@ -134,7 +134,7 @@ def read_object(frame: ObjectFrame, number: int) -> SeenObject:
     try:
         thing = _OBJECT.decode(frame.objects[number])
     except BAD_BYTES as error:
-        raise RemoteProtocolError(f"objects[{number}]: {error}; valid: fields as in docs/drivers.md") from error
+        raise RemoteProtocolError(f"objects[{number}]: {error!s:.300}; valid: fields as in docs/drivers.md") from error
     thing.require_possible()
     return thing
 
@@ -144,4 +144,4 @@ def read_mesh(frame: ObjectFrame, name: str) -> SentMesh:
     try:
         return _MESH.decode(frame.meshes[name])
     except BAD_BYTES as error:
-        raise RemoteProtocolError(f"meshes: {name!r}: {error}; valid: vertices and triangles") from error
+        raise RemoteProtocolError(f"meshes: {name!r}: {error!s:.300}; valid: vertices and triangles") from error

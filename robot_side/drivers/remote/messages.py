@@ -118,7 +118,8 @@ def decoded(payload: bytes, decoder: "msgspec.msgpack.Decoder[Message]", version
         message = decoder.decode(payload)
     except BAD_BYTES as error:
         _require_version(payload, version)
-        raise RemoteProtocolError(f"{error}; valid: finite numbers, and fields as in docs/drivers.md") from error
+        # It may quote a whole message.
+        raise RemoteProtocolError(f"{error!s:.300}; valid: finite numbers, and fields as in docs/drivers.md") from error
     if (said := getattr(message, "version", None)) != version:
         raise OtherVersionError(f"version {said}; valid: {version}")
     return message
