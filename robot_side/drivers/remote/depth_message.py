@@ -6,13 +6,13 @@ from typing import Annotated, Final
 
 import msgspec
 import numpy as np
-from msgspec import UNSET, Meta, Struct, UnsetType
+from msgspec import Meta, Struct
 
 from common.errors import RemoteProtocolError
 from common.roles import Role
 from robot_side.depth.picture import DepthArray, DepthPicture, Pinhole
-from robot_side.drivers.remote.messages import decoded
 from robot_side.drivers.remote.picture_message import Intrinsics
+from robot_side.drivers.remote.sender_clock import Stamped, decoded_stamped
 
 DEPTH_VERSION: Final = 1
 DEPTH_LIMIT_BYTES: Final = 3 * 1024 * 1024
@@ -24,8 +24,6 @@ _UNIT: Final = 0.01
 """Largest deviation of a quaternion's length from 1 that is accepted"""
 
 _Pixels = Annotated[int, Meta(ge=16, le=1920)]
-_Stamp = Annotated[float, Meta(ge=-1e12, le=1e12)]
-"""Time in s; beyond these limits a double no longer resolves milliseconds."""
 _Coordinate = Annotated[float, Meta(ge=-100.0, le=100.0)]
 _Label = Annotated[int, Meta(ge=1, le=MOST_LABELS)]
 _Name = Annotated[str, Meta(min_length=1, max_length=100)]
@@ -41,18 +39,9 @@ class SentMount(Struct, frozen=True, forbid_unknown_fields=True):
     """From the camera's frame, whose x is right, y down and z ahead in its picture; w first"""
 
 
-class DepthMessage(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class DepthMessage(Stamped, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Depth picture of one camera; its times are on the sender's clock."""
 
-    version: int
-    sequence: Annotated[int, Meta(ge=0, le=2**53)]
-    sent_s: _Stamp
-    taken_s: _Stamp
-    """Time at which the camera took the picture, no later than `sent_s`"""
-    echo_s: _Stamp | UnsetType | None = UNSET
-    """`sent_s` of the newest answer that the sender has read, None before the first; UNSET: it wants no answers"""
-    held_s: Annotated[float, Meta(ge=0.0, lt=1e6)] = 0.0
-    """Time from reading that answer to `sent_s`, in s"""
     camera: _Name
     width: _Pixels
     height: _Pixels
@@ -82,9 +71,7 @@ _DECODER: Final = msgspec.msgpack.Decoder(DepthMessage)
 
 def read_depth(payload: bytes) -> DepthMessage:
     """Decode a message; RemoteProtocolError names an invalid field."""
-    message = decoded(payload, _DECODER, DEPTH_VERSION)
-    if message.taken_s > message.sent_s:
-        raise RemoteProtocolError(f"taken_s = {message.taken_s}; valid: up to sent_s = {message.sent_s}")
+    message = decoded_stamped(payload, _DECODER, DEPTH_VERSION)
     pixels = message.width * message.height
     for name, content, each in (("depth", message.depth, 2), ("labels", message.labels, 1)):
         if content is not None and len(content) != each * pixels:

@@ -4,12 +4,12 @@ import math
 from typing import Annotated, Final
 
 import msgspec
-from msgspec import UNSET, Meta, Struct, UnsetType
+from msgspec import Meta, Struct
 
 from common.errors import RemoteProtocolError
-from common.limits import Finite
 from common.roles import Role
-from robot_side.drivers.remote.messages import BAD_BYTES, decoded
+from robot_side.drivers.remote.messages import BAD_BYTES
+from robot_side.drivers.remote.sender_clock import Stamped, decoded_stamped
 
 FRAME_VERSION: Final = 1
 FRAME_LIMIT_BYTES: Final = 1024 * 1024
@@ -27,7 +27,6 @@ _Three = tuple[_Coordinate, _Coordinate, _Coordinate]
 _Sizes = tuple[_Size, _Size, _Size]
 _Tetrahedron = tuple[_Three, _Three, _Three, _Three]
 _Name = Annotated[str, Meta(min_length=1, max_length=100)]
-_Duration = Annotated[float, Meta(ge=0.0, lt=1e6)]
 _Corner = Annotated[int, Meta(ge=0, lt=2**31)]
 
 SHAPES: Final = ("sphere", "box", "ellipsoid", "half_space", "tetrahedra", "mesh")
@@ -78,19 +77,10 @@ class SentMesh(Struct, frozen=True, forbid_unknown_fields=True):
     """Indices of three corners each, anticlockwise as seen from outside"""
 
 
-class ObjectFrame(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class ObjectFrame(Stamped, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Frame of all objects that are present; its times are on the sender's clock."""
 
-    version: int
-    sequence: Annotated[int, Meta(ge=0, le=2**53)]
-    sent_s: Finite
-    taken_s: Finite
-    """Time at which the camera took the picture, no later than `sent_s`"""
-    echo_s: Finite | UnsetType | None = UNSET
-    """`sent_s` of the newest answer that the sender has read, None before the first; UNSET: it wants no answers"""
-    held_s: _Duration = 0.0
-    """Time from reading that answer to `sent_s`, in s"""
-    meshes: Annotated[dict[_Name, msgspec.Raw], Meta(max_length=MOST_MESHES)] = {}
+    meshes: Annotated[dict[_Name, msgspec.Raw], Meta(max_length=MOST_MESHES)] = {}  # noqa: RUF012  # a struct has its own
     """Meshes by name, each a `SentMesh`; they count in this frame and in all later ones"""
     objects: Annotated[tuple[msgspec.Raw, ...], Meta(max_length=MOST_OBJECTS)]
     """Objects, each a `SeenObject`; decoded some at a time"""
@@ -123,10 +113,7 @@ class UnknownMeshError(ValueError):
 
 def read_frame(payload: bytes) -> ObjectFrame:
     """Decode a frame, without its objects and meshes; RemoteProtocolError names an invalid field."""
-    frame = decoded(payload, _FRAME, FRAME_VERSION)
-    if frame.taken_s > frame.sent_s:
-        raise RemoteProtocolError(f"taken_s = {frame.taken_s}; valid: up to sent_s = {frame.sent_s}")
-    return frame
+    return decoded_stamped(payload, _FRAME, FRAME_VERSION)
 
 
 def read_object(frame: ObjectFrame, number: int) -> SeenObject:

@@ -3,11 +3,11 @@
 from typing import Annotated, Final, Literal
 
 import msgspec
-from msgspec import UNSET, Meta, Struct, UnsetType
+from msgspec import Meta, Struct
 
 from common.errors import RemoteProtocolError
 from common.protocol.view_messages import ViewName
-from robot_side.drivers.remote.messages import decoded
+from robot_side.drivers.remote.sender_clock import Stamped, decoded_stamped
 
 PICTURE_VERSION: Final = 1
 PICTURE_LIMIT_BYTES: Final = 1024 * 1024
@@ -18,8 +18,6 @@ _JPEG: Final = b"\xff\xd8\xff"
 _COLORS: Final = 3
 
 _Pixels = Annotated[int, Meta(ge=LEAST_PIXELS, le=MOST_PIXELS)]
-_Stamp = Annotated[float, Meta(ge=-1e12, le=1e12)]
-"""Time in s; beyond these limits a double no longer resolves milliseconds."""
 _Focal = Annotated[float, Meta(gt=0.0, le=1e5)]
 _Middle = Annotated[float, Meta(ge=-1e4, le=1e4)]
 
@@ -33,18 +31,9 @@ class Intrinsics(Struct, frozen=True, forbid_unknown_fields=True):
     cy: _Middle
 
 
-class PictureMessage(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class PictureMessage(Stamped, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Picture of one view; its times are on the sender's clock. Its bytes are not decoded here."""
 
-    version: int
-    sequence: Annotated[int, Meta(ge=0, le=2**53)]
-    sent_s: _Stamp
-    taken_s: _Stamp
-    """Time at which the camera took the picture, no later than `sent_s`"""
-    echo_s: _Stamp | UnsetType | None = UNSET
-    """`sent_s` of the newest answer that the sender has read, None before the first; UNSET: it wants no answers"""
-    held_s: Annotated[float, Meta(ge=0.0, lt=1e6)] = 0.0
-    """Time from reading that answer to `sent_s`, in s"""
     view: ViewName
     width: _Pixels
     height: _Pixels
@@ -58,9 +47,7 @@ _DECODER: Final = msgspec.msgpack.Decoder(PictureMessage)
 
 def read_picture(payload: bytes) -> PictureMessage:
     """Decode a message; RemoteProtocolError names an invalid field. Whether a JPEG is one is found out elsewhere."""
-    message = decoded(payload, _DECODER, PICTURE_VERSION)
-    if message.taken_s > message.sent_s:
-        raise RemoteProtocolError(f"taken_s = {message.taken_s}; valid: up to sent_s = {message.sent_s}")
+    message = decoded_stamped(payload, _DECODER, PICTURE_VERSION)
     size, expected = len(message.content), _COLORS * message.width * message.height
     if message.format == "rgb8" and size != expected:
         shape = f"{message.width} x {message.height} pixels"

@@ -1,11 +1,14 @@
 """Age of what a camera's or a perception's program sends, as far as stamps bound it (docs/drivers.md)."""
 
 import math
-from typing import Final, Protocol
+from typing import Annotated, Final, TypeVar
 
-from msgspec import UNSET, UnsetType
+import msgspec
+from msgspec import UNSET, Meta, Struct, UnsetType
 
+from common.errors import RemoteProtocolError
 from robot_side.drivers.remote.driver_clock import DriverClock
+from robot_side.drivers.remote.messages import decoded
 
 UNBOUNDED_S: Final = 0.5
 """Time by which a message may be older than it seems, where no echo bounds its age"""
@@ -13,33 +16,34 @@ _UNANSWERED: Final = 50
 """Number of answers without an echo after which the age of messages counts as unbounded"""
 
 
-class Stamped(Protocol):
-    """Message with times on its sender's clock."""
+_Stamp = Annotated[float, Meta(ge=-1e12, le=1e12)]
+"""Time in s; beyond these limits a double no longer resolves milliseconds."""
 
-    @property
-    def sequence(self) -> int:
-        """Number that rises with every message of a sender"""
-        ...
 
-    @property
-    def sent_s(self) -> float:
-        """Time of sending"""
-        ...
+class Stamped(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Message whose times are on its sender's clock: what all but an arm's states begin with."""
 
-    @property
-    def taken_s(self) -> float:
-        """Time at which the camera took the picture, no later than `sent_s`"""
-        ...
+    version: int
+    sequence: Annotated[int, Meta(ge=0, le=2**53)]
+    """Number that rises with every message of a sender"""
+    sent_s: _Stamp
+    taken_s: _Stamp
+    """Time at which the camera took the picture, no later than `sent_s`"""
+    echo_s: _Stamp | UnsetType | None = UNSET
+    """`sent_s` of the newest answer that the sender has read, None before the first; UNSET: it wants no answers"""
+    held_s: Annotated[float, Meta(ge=0.0, lt=1e6)] = 0.0
+    """Time from reading that answer to `sent_s`, in s"""
 
-    @property
-    def echo_s(self) -> float | UnsetType | None:
-        """`sent_s` of the newest answer that was read, None before the first; UNSET: no answers are wanted"""
-        ...
 
-    @property
-    def held_s(self) -> float:
-        """Time from reading that answer to `sent_s`, in s"""
-        ...
+_Message = TypeVar("_Message", bound=Stamped)
+
+
+def decoded_stamped(payload: bytes, decoder: "msgspec.msgpack.Decoder[_Message]", version: int) -> _Message:
+    """Unpack and validate a message; RemoteProtocolError names an invalid field."""
+    message = decoded(payload, decoder, version)
+    if message.taken_s > message.sent_s:
+        raise RemoteProtocolError(f"taken_s = {message.taken_s}; valid: up to sent_s = {message.sent_s}")
+    return message
 
 
 class SenderClock:

@@ -161,6 +161,7 @@ def test_a_role_is_changed_from_the_next_frame_on() -> None:
         ([CUP | {"position_m": [math.nan, 0, 0]}], {}, "position_m"),
         ([CUP | {"sphere": -1.0}], {}, "sphere"),
         ([CUP], {"taken_s": 4.0}, "taken_s = 4.0; valid: up to sent_s = 3.0"),
+        ([CUP], {"taken_s": -1e15}, "taken_s"),
         ([CUP], {"version": 2}, "version 2; valid: 1"),
         ([CUP], {"sequence": 1}, "sequence = 1; valid: above"),
         ([CUP], {"peer": b"other"}, "a second perception"),
