@@ -60,6 +60,11 @@ def cloud_of(message: Any, where: str) -> Cloud:
     try:
         formats = [order + _POINT_TYPES[fields[name].datatype] for name in COORDINATES]
         offsets = [fields[name].offset for name in COORDINATES]
+        end = max(offset + np.dtype(one).itemsize for offset, one in zip(offsets, formats, strict=True))
+        # NumPy's own check of offsets overflows.
+        if end > message.point_step or message.width * message.point_step > message.row_step:
+            sizes = f"{message.width} points of {message.point_step} bytes in rows of {message.row_step}"
+            raise ValueError(f"x, y and z end at byte {end}, {sizes}")
         point = np.dtype({"names": COORDINATES, "formats": formats, "offsets": offsets, "itemsize": message.point_step})
         rows = np.asarray(message.data).reshape(message.height, message.row_step)
     except (KeyError, ValueError) as error:

@@ -98,6 +98,27 @@ def test_a_cloud_without_coordinates_is_refused_by_its_topic() -> None:
         cloud_of(sent, "/points")
 
 
+@pytest.mark.parametrize(
+    ("fields", "says"),
+    [
+        # NumPy takes such an offset, and reads elsewhere in memory.
+        ({"offset": 2**31 - 1}, "x, y and z end at byte 21474836"),
+        ({"offset": 1000}, "x, y and z end at byte 100"),
+        ({"width": 1000}, "1000 points of "),
+        ({"point_step": 2**32 - 1}, "points of 4294967295 bytes"),
+        ({"row_step": 1}, "in rows of 1;"),
+        ({"height": 2}, "reshape"),
+    ],
+)
+def test_a_cloud_whose_sizes_lie_is_refused(fields: dict[str, int], says: str) -> None:
+    sent = cloud(TYPES, POINTS, 0.0, 1, "<")
+    for name, value in fields.items():
+        setattr(sent.fields[-1] if name == "offset" else sent, name, value)
+    with pytest.raises(ConfigurationError, match=r"^/points: fields, point_step or row_step: ") as refused:
+        cloud_of(sent, "/points")
+    assert says in str(refused.value)
+
+
 def test_a_cloud_without_points_is_an_empty_picture() -> None:
     found = cloud_of(cloud(TYPES, np.empty((0, 3)), 0.0, 1, "<"), "/points")
     assert not depth_of(found, VirtualCamera())[0].any()
