@@ -23,7 +23,7 @@ from feelahead.both_sides.processes import SideProcess
 from tests.helpers.repository import ROOT
 
 ATTACKS: Final[tuple[tuple[str, str, KeyRole | None], ...]] = (
-    *(("strangers", port, None) for port in ("--bind", "view", "--arm", "--objects")),
+    *(("strangers", port, None) for port in ("--bind", "view", "--arm", "--objects", "--pictures")),
     ("tiny", "--bind", "operator"),
     ("endless", "--bind", "operator"),
     ("subscriptions", "view", "observer"),
@@ -33,6 +33,8 @@ ATTACKS: Final[tuple[tuple[str, str, KeyRole | None], ...]] = (
     ("tiny", "--arm", "driver"),
     ("large", "--objects", "perception"),
     ("endless", "--objects", "perception"),
+    ("wordy", "--objects", "perception"),
+    *((kind, "--pictures", "perception") for kind in ("tiny", "large", "endless", "wordy")),
 )
 """Kind, port, and role of the key; None without a key"""
 ARMED_SHARE: Final = 0.95
@@ -81,16 +83,21 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seconds", type=float, default=600.0)
     parser.add_argument("--without", nargs="*", default=[], metavar="KIND", help="attacks to leave out")
-    parser.add_argument("--simulated", action="store_true", help="a simulated arm and camera, without drivers' ports")
+    parser.add_argument("--simulated", action="store_true", help="a simulated arm and camera: no --arm, no --objects")
     asked = parser.parse_args()
     with tempfile.TemporaryDirectory() as place, contextlib.ExitStack() as stack:
         folder = Path(place)
         public, summary = keys(folder)["robot"], folder / "summary.json"
         drivers = [] if asked.simulated else ["--arm=tcp://127.0.0.1:5601", "--objects=tcp://127.0.0.1:5602"]
-        ports = {"--bind": "tcp://127.0.0.1:5600", "view": "tcp://127.0.0.1:5603"}
+        ports = {"--bind": "tcp://127.0.0.1:5600", "view": "tcp://127.0.0.1:5603", "--pictures": "tcp://127.0.0.1:5604"}
         ports |= {} if asked.simulated else {"--arm": "tcp://127.0.0.1:5601", "--objects": "tcp://127.0.0.1:5602"}
         given = [f"--bind={ports['--bind']}", f"--view-bind={ports['view']}", f"--keys={folder / 'robot'}"]
-        given += ["--no-cameras", f"--summary={summary}", f"--audit={folder / 'audit.jsonl'}", *drivers]
+        given += [
+            f"--pictures={ports['--pictures']}",
+            f"--summary={summary}",
+            f"--audit={folder / 'audit.jsonl'}",
+            *drivers,
+        ]
         robot = stack.enter_context(SideProcess("robot_side", "robot", given))
 
         def start(*words: str) -> None:

@@ -59,6 +59,15 @@ def large(part: "zmq.Socket[bytes]") -> Iterator[None]:
         yield
 
 
+def wordy(part: "zmq.Socket[bytes]") -> Iterator[None]:
+    """Send messages whose fault is a long word, which a refusal could quote."""
+    message = msgpack.packb({"a \x1b" * 300_000: 1})
+    while True:
+        with contextlib.suppress(zmq.Again):
+            part.send(message, zmq.NOBLOCK)
+        yield
+
+
 def lying(part: "zmq.Socket[bytes]") -> Iterator[None]:
     """Send states of an arm that jumps, as another driver."""
     generator, sequence = random.Random(7), 0  # noqa: S311  # repeatable, not secret
@@ -104,6 +113,7 @@ KINDS: Final[dict[str, tuple[int, Callable[["zmq.Socket[bytes]"], Iterator[None]
     "tiny": (zmq.DEALER, tiny),
     "endless": (zmq.DEALER, endless),
     "large": (zmq.DEALER, large),
+    "wordy": (zmq.DEALER, wordy),
     "lying": (zmq.DEALER, lying),
     "subscriptions": (zmq.SUB, subscriptions),
 }
