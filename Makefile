@@ -106,7 +106,7 @@ test-console: $(VENV)/.installed $(VENV)/.kernels ## the console in a real brows
 	$(SUITE) -m "console and not quiet" tests/console $(ARGS)
 
 # With keys, on loopback; ARGS="--seconds 60 --simulated" is shorter, without the drivers' ports.
-soak: $(VENV)/.installed $(VENV)/.kernels ## every port under attack for ten minutes while an honest operator drives
+soak: $(VENV)/.installed $(VENV)/.kernels ## every port but --depth under attack for ten minutes while an honest operator drives
 	$(BIN)/python -m tests.soak $(ARGS)
 
 # Before figures are published. What fails while other programs take a tenth of a processor is "not judged".
