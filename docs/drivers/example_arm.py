@@ -55,4 +55,10 @@ def main(address: str) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1] if len(sys.argv) > 1 else "tcp://127.0.0.1:5601")
+    try:
+        main(sys.argv[1] if len(sys.argv) > 1 else "tcp://127.0.0.1:5601")
+    except KeyboardInterrupt:
+        pass
+    except zmq.ZMQError as error:
+        print(f"{error}; valid: tcp://127.0.0.1:5601", file=sys.stderr)
+        sys.exit(2)
