@@ -11,25 +11,46 @@ import time
 import msgpack
 import zmq
 
-socket = zmq.Context().socket(zmq.DEALER)
-socket.setsockopt(zmq.SNDHWM, 2)
-socket.connect(sys.argv[1] if len(sys.argv) > 1 else "tcp://127.0.0.1:5602")
-sequence, next_s, echo = 0, time.monotonic(), (None, 0.0)
-while True:
-    sequence, now_s = sequence + 1, time.monotonic()
-    side_m, speed_m_s = 0.1 * math.sin(now_s), 0.1 * math.cos(now_s)
-    table = {"name": "table", "half_space": True}
-    target = {"name": "target", "box": [0.02, 0.02, 0.05], "position_m": [0.6, 0.0, 0.05], "sd_m": 0.003}
-    ball = {"name": "ball", "sphere": 0.03, "position_m": [0.5, side_m, 0.2], "velocity_m_s": [0.0, speed_m_s, 0.0]}
-    frame = {"version": 1, "sequence": sequence, "sent_s": now_s, "taken_s": now_s, "objects": [table, target, ball]}
-    echo_s, read_s = echo
-    frame |= {"echo_s": echo_s, "held_s": 0.0 if echo_s is None else now_s - read_s}
-    with contextlib.suppress(zmq.Again):  # no robot side yet
-        socket.send(msgpack.packb(frame), zmq.NOBLOCK)
-    next_s = max(next_s + 1 / 30, now_s)
-    while socket.poll(1e3 * max(next_s - time.monotonic(), 0.0)):  # an answer's time of reading bounds the frames' age
-        answer, read_s = msgpack.unpackb(socket.recv()), time.monotonic()
-        if "refused" in answer:
-            print("refused:", answer["refused"], flush=True)
-        else:
-            echo = answer["sent_s"], read_s
+
+def main(address: str = "tcp://127.0.0.1:5602") -> None:
+    """Send until a signal ends it."""
+    socket = zmq.Context().socket(zmq.DEALER)
+    socket.sndhwm, socket.linger = 2, 0
+    socket.connect(address)
+    sequence, next_s, echo = 0, time.monotonic(), (None, 0.0)
+    while True:
+        sequence, now_s = sequence + 1, time.monotonic()
+        side_m, speed_m_s = 0.1 * math.sin(now_s), 0.1 * math.cos(now_s)
+        table = {"name": "table", "half_space": True}
+        target = {"name": "target", "box": [0.02, 0.02, 0.05], "position_m": [0.6, 0.0, 0.05], "sd_m": 0.003}
+        ball = {"name": "ball", "sphere": 0.03, "position_m": [0.5, side_m, 0.2], "velocity_m_s": [0.0, speed_m_s, 0.0]}
+        frame = {
+            "version": 1,
+            "sequence": sequence,
+            "sent_s": now_s,
+            "taken_s": now_s,
+            "objects": [table, target, ball],
+        }
+        echo_s, read_s = echo
+        frame |= {"echo_s": echo_s, "held_s": 0.0 if echo_s is None else now_s - read_s}
+        with contextlib.suppress(zmq.Again):  # no robot side yet
+            socket.send(msgpack.packb(frame), zmq.NOBLOCK)
+        next_s = max(next_s + 1 / 30, now_s)
+        while socket.poll(
+            1e3 * max(next_s - time.monotonic(), 0.0)
+        ):  # an answer's time of reading bounds the frames' age
+            answer, read_s = msgpack.unpackb(socket.recv()), time.monotonic()
+            if "refused" in answer:
+                print("refused:", answer["refused"], flush=True)
+            else:
+                echo = answer["sent_s"], read_s
+
+
+if __name__ == "__main__":
+    try:
+        main(*sys.argv[1:2])
+    except KeyboardInterrupt:
+        pass
+    except zmq.ZMQError as error:
+        print(f"{error}; valid: tcp://127.0.0.1:5602", file=sys.stderr)
+        sys.exit(2)

@@ -17,23 +17,41 @@ import msgpack
 import zmq
 
 DELAY_S = 0.05  # from exposure to the end of `read`: measure it, say by pictures of a running clock
-address, view, number = (sys.argv[1:] + ["tcp://127.0.0.1:5603", "first_person", "0"][len(sys.argv) - 1 :])[:3]
-socket = zmq.Context().socket(zmq.DEALER)
-socket.setsockopt(zmq.SNDHWM, 2)
-socket.connect(address)
-camera, pinhole = cv2.VideoCapture(int(number)), {}  # for the overlay, "intrinsics" as cv2.calibrateCamera finds them
-message = {"version": 1, "sequence": 0, "view": view, "format": "jpeg", "echo_s": None} | pinhole
-read_s = 0.0
-while True:
-    picture = camera.read()[1]
-    message["taken_s"], message["bytes"] = time.monotonic() - DELAY_S, cv2.imencode(".jpg", picture)[1].tobytes()
-    message["sequence"], (message["height"], message["width"]) = message["sequence"] + 1, picture.shape[:2]
-    message["sent_s"] = time.monotonic()
-    message["held_s"] = 0.0 if message["echo_s"] is None else message["sent_s"] - read_s
-    with contextlib.suppress(zmq.Again):  # no robot side yet
-        socket.send(msgpack.packb(message), zmq.NOBLOCK)
-    while socket.poll(5):  # an answer that is read at once bounds the pictures' age best
-        answer, read_s = msgpack.unpackb(socket.recv()), time.monotonic()
-        print(f"refused: {answer['refused']}", flush=True) if "refused" in answer else message.update(
-            echo_s=answer["sent_s"]
-        )
+
+
+def main(address: str = "tcp://127.0.0.1:5603", view: str = "first_person", number: str = "0") -> None:
+    """Send until a signal ends it; OSError if the camera gives no picture."""
+    socket = zmq.Context().socket(zmq.DEALER)
+    socket.sndhwm, socket.linger = 2, 0
+    socket.connect(address)
+    camera, pinhole = (
+        cv2.VideoCapture(int(number)),
+        {},
+    )  # for the overlay, "intrinsics" as cv2.calibrateCamera finds them
+    message = {"version": 1, "sequence": 0, "view": view, "format": "jpeg", "echo_s": None} | pinhole
+    read_s = 0.0
+    while True:
+        good, picture = camera.read()
+        if not good:
+            raise OSError(f"camera {number} gives no picture")
+        message["taken_s"], message["bytes"] = time.monotonic() - DELAY_S, cv2.imencode(".jpg", picture)[1].tobytes()
+        message["sequence"], (message["height"], message["width"]) = message["sequence"] + 1, picture.shape[:2]
+        message["sent_s"] = time.monotonic()
+        message["held_s"] = 0.0 if message["echo_s"] is None else message["sent_s"] - read_s
+        with contextlib.suppress(zmq.Again):  # no robot side yet
+            socket.send(msgpack.packb(message), zmq.NOBLOCK)
+        while socket.poll(5):  # an answer that is read at once bounds the pictures' age best
+            answer, read_s = msgpack.unpackb(socket.recv()), time.monotonic()
+            print(f"refused: {answer['refused']}", flush=True) if "refused" in answer else message.update(
+                echo_s=answer["sent_s"]
+            )
+
+
+if __name__ == "__main__":
+    try:
+        main(*sys.argv[1:4])
+    except KeyboardInterrupt:
+        pass
+    except (OSError, ValueError, zmq.ZMQError) as error:
+        print(f"{error}; valid: [tcp://127.0.0.1:5603 [first_person|overview [0]]]", file=sys.stderr)
+        sys.exit(2)

@@ -84,7 +84,15 @@ def drive(robot: Any, address: str, rate_hz: float = 50.0) -> None:
 
 
 if __name__ == "__main__":
-    from lerobot.robots.so_follower import SO101Follower, SOFollowerRobotConfig
+    try:
+        from lerobot.robots.so_follower import SO101Follower, SOFollowerRobotConfig
 
-    with SO101Follower(SOFollowerRobotConfig(sys.argv[1], False, id=sys.argv[2], use_degrees=True)) as arm:
-        drive(arm, sys.argv[3])
+        port, name, address = sys.argv[1:]
+        with SO101Follower(SOFollowerRobotConfig(port, False, id=name, use_degrees=True)) as arm:
+            drive(arm, address)
+    except (ImportError, OSError, ValueError, zmq.ZMQError) as error:
+        print(
+            f"{' '.join(str(error).split())}; valid: /dev/ttyACM0 ID tcp://127.0.0.1:5601, in LeRobot's environment",
+            file=sys.stderr,
+        )
+        sys.exit(2)

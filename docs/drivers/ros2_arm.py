@@ -83,8 +83,11 @@ class Arm(Node):
 
 
 if __name__ == "__main__":
-    kind, topic, joints, *more = sys.argv[1:]
-    if kind not in KINDS or "velocit" in topic:
-        sys.exit(f"{kind} {topic}: of velocities, which goes on if this process dies; valid: positions, trajectory")
+    kind, topic, joints, *more = sys.argv[1:] if len(sys.argv) > 3 else [""] * 3
+    if kind not in KINDS or "velocit" in topic or not joints or not all("=" in word for word in more):
+        why = "a topic of velocities goes on if this process dies"
+        usage = "positions|trajectory TOPIC JOINT,JOINT,... [NAME=VALUE ...]"
+        print(f"{' '.join(sys.argv[1:])}; valid: {usage}; {why}", file=sys.stderr)
+        sys.exit(2)
     rclpy.init()
     rclpy.spin(Arm(kind, topic, joints.split(","), dict(word.split("=", 1) for word in more)))

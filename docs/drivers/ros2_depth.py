@@ -1,8 +1,8 @@
 """Source of the depth that a camera under ROS 2 publishes (rclpy), in your own ROS environment with pyzmq and msgpack.
 
-Usage: PYTHONPATH=. python docs/drivers/ros2_depth.py image|cloud TOPIC [NAME=VALUE ...], in feelahead's clone. Names:
-address; camera; info, the topic with CameraInfo; rectified=yes: P counts, not K and D; latency_s, from exposure until a
-message is here, for stamps of another clock. A cloud, PointCloud2, has z ahead.
+Usage: python docs/drivers/ros2_depth.py image|cloud TOPIC [NAME=VALUE ...], in feelahead's clone. Names: address;
+camera; info, the topic with CameraInfo; rectified=yes: P counts, not K and D; latency_s, from exposure until a message
+is here, for stamps of another clock. A cloud, PointCloud2, has z ahead.
 """
 
 import contextlib
@@ -10,7 +10,11 @@ import re
 import sys
 import time
 from functools import partial
+from pathlib import Path
 
+if "--help" in sys.argv:
+    print(__doc__, end="")
+    sys.exit()
 try:
     import msgpack
     import numpy as np
@@ -21,10 +25,11 @@ try:
     from rclpy.qos import QoSProfile, ReliabilityPolicy
     from sensor_msgs.msg import CameraInfo, Image, PointCloud2
 
+    sys.path.insert(0, str(Path(__file__).resolve().parents[2]))  # feelahead's clone
     from robot_side.depth.recorded.cloud import VirtualCamera, depth_of
     from robot_side.depth.recorded.ros_messages import cloud_of, depth_of_image, pinhole_of
 except ImportError as error:
-    print(f"{error}; valid: a sourced ROS 2 with numpy, pyzmq and msgpack, PYTHONPATH=.", file=sys.stderr)
+    print(f"{error}; valid: a sourced ROS 2 with numpy, pyzmq and msgpack, and feelahead's clone", file=sys.stderr)
     sys.exit(2)
 
 WORDS = {"address": "tcp://127.0.0.1:5604", "camera": "wrist", "info": "", "rectified": "no", "latency_s": ""}
@@ -37,10 +42,10 @@ class Source:
     def __init__(self, kind: str, topic: str, said: dict[str, str]) -> None:
         self.latency_s, self.rectified, self.info = float(said["latency_s"] or "nan"), said["rectified"] == "yes", None
         self.message = {"version": 1, "sequence": 0, "camera": said["camera"], "depth_unit_m": UNIT_M, "echo_s": None}
-        self.read_s, self.before, self.topics = 0.0, 0, [topic]
+        self.read_s, self.before, self.topics, self.address = 0.0, 0, [topic], said["address"]
         self.socket, self.node = zmq.Context().socket(zmq.DEALER), rclpy.create_node("feelahead_depth")
         self.socket.sndhwm, self.socket.linger = 2, 0  # old pictures are useless
-        self.socket.connect(said["address"])
+        self.socket.connect(self.address)
         newest = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
         if kind == "image":
             self.topics.append(said["info"] or topic.rpartition("/")[0] + "/camera_info")
@@ -61,10 +66,13 @@ class Source:
             self.send(now_s - max(age_s, 0.0), depth_of_image(seen), pinhole_of(self.info, seen, self.rectified))
 
     def complain(self) -> None:
-        """Say who publishes, if nothing was sent since the last time."""
+        """Say who publishes what, if nothing was sent since the last time, or that no robot side answers."""
         if self.message["sequence"] == self.before:
-            there = (f"{topic} has {self.node.count_publishers(topic)} publishers" for topic in self.topics)
-            print(f"nothing is sent: {', '.join(there)}", flush=True)
+            there = {one: [by.topic_type for by in self.node.get_publishers_info_by_topic(one)] for one in self.topics}
+            said = (f"{one} has {len(by)} publishers{' of '.join(['', *sorted({*by})])}" for one, by in there.items())
+            print(f"nothing is sent: {', '.join(said)}", flush=True)
+        elif time.monotonic() - self.read_s > SILENT_S:
+            print(f"no robot side answers at {self.address}", flush=True)
         self.before = self.message["sequence"]
 
     def send(self, taken_s: float, depth_m: np.ndarray, of: object) -> None:

@@ -94,6 +94,8 @@ def watch_depth(one: ArmAlone, seconds: float, say: Callable[[str], None], *, po
             new = looked.figures.keys() - known
             if new and not known:
                 end_s = now_s + seconds
+                if remote is not None:
+                    del remote.senders.rejected["late"]  # they had come before this could look
     refused = {} if remote is None else {str(why): count for why, count in remote.senders.rejected.items()}
     seen = {name: number for name, number in numbers.items() if number in looked.figures}
     figures = {name: looked.figures[number] for name, number in seen.items()}

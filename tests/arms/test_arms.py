@@ -97,6 +97,6 @@ def test_another_number_of_joints_is_refused_by_name(name: str, folder: Path) ->
 def test_a_controller_of_velocities_is_refused_in_one_line(kind: str, topic: str) -> None:
     words = [str(provided("ros2")), str(DRIVERS / "ros2_arm.py"), kind, topic, ",".join(JOINTS)]
     done = subprocess.run(words, capture_output=True, text=True, timeout=LIMIT_S, cwd=ROOT, check=False)
-    assert done.returncode != 0
+    assert done.returncode == 2
     assert len(done.stderr.splitlines()) == 1
     assert "goes on if this process dies" in done.stderr

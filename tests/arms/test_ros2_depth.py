@@ -16,7 +16,6 @@ from robot_side.drivers.remote.depth_message import DEPTH_LIMIT_BYTES
 from tests.arms.provide import provided
 from tests.arms.trial import DRIVERS, Program
 from tests.helpers.machines.waiting import wait_until
-from tests.helpers.repository import ROOT
 from tests.helpers.socket_talk import EPHEMERAL
 from tests.robot_side.depth.mapping import NOBODY, fronts
 from tests.robot_side.depth.ray_cast import STEREO
@@ -42,7 +41,7 @@ def begin(tmp_path: Path) -> Iterator[Begin]:
     """What starts a program with the Python of ROS 2."""
     number = os.getpid() % 100
     ros = {"ROS_DOMAIN_ID": str(number), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
-    environment, begun = {**os.environ, **ros, "PYTHONPATH": str(ROOT), "PYTHONUNBUFFERED": "1"}, list[Program]()
+    environment, begun = {**os.environ, **ros, "PYTHONPATH": "", "PYTHONUNBUFFERED": "1"}, list[Program]()
 
     def start(*words: str) -> Program:
         begun.append(Program([str(provided("ros2")), *words], tmp_path / f"{len(begun)}.txt", environment))

@@ -47,7 +47,7 @@ def test_the_pictures_of_a_process_are_looked_at() -> None:
             sequence, since_s = 0, time.monotonic()
             while doctor.poll() is None and time.monotonic() - since_s < LIMIT_S:
                 sequence += 1
-                camera.send(msgpack.packb(message(sequence)))
+                camera.send(msgpack.packb(message(sequence, age_s=5.0 if sequence < 3 else 0.05)))
                 time.sleep(0.03)
             found = json.loads(doctor.stdout.read()) if doctor.stdout is not None else {}
         finally:
@@ -88,12 +88,12 @@ def test_the_mount_of_a_simulated_camera_is_solved_in_several_poses() -> None:
     assert code in (0, 1)
 
 
-def message(sequence: int) -> dict[str, Any]:
+def message(sequence: int, age_s: float) -> dict[str, Any]:
     """Return a picture of a floor 1.4 m below the camera, a quarter of which is empty."""
     depth, now_s = np.full((HEIGHT, WIDTH), 1400, "<u2"), time.monotonic()
     depth[:, : WIDTH // 4] = 0
     return {
-        **{"version": 1, "sequence": sequence, "sent_s": now_s, "taken_s": now_s - 0.05, "camera": "above"},
+        **{"version": 1, "sequence": sequence, "sent_s": now_s, "taken_s": now_s - age_s, "camera": "above"},
         **{"width": WIDTH, "height": HEIGHT, "depth": depth.tobytes(), "depth_unit_m": 0.001, "mount": MOUNT},
         "intrinsics": {"fx": 130.0, "fy": 130.0, "cx": 80.0, "cy": 60.0},
     }

@@ -18,7 +18,7 @@ from robot_side.drivers.remote.driver_session import ArmShape
 from robot_side.drivers.remote.frame_message import read_frame, read_object
 from robot_side.drivers.remote.objects import RemoteObjects
 from tests.helpers.machines.waiting import LIMIT_S
-from tests.helpers.python_process import start
+from tests.helpers.python_process import ended, start
 from tests.helpers.repository import ROOT
 from tests.helpers.socket_talk import EPHEMERAL, ROUNDS
 
@@ -130,3 +130,25 @@ def test_the_example_in_cpp_packs_what_the_robot_side_reads(tmp_path: Path) -> N
         ("table", True, None),
         ("target", False, 0.03),
     ]
+
+
+@pytest.mark.processes
+@pytest.mark.parametrize(
+    ("name", "words", "said"),
+    [
+        ("example_arm.py", ("nowhere",), "nowhere"),
+        ("example_objects.py", ("nowhere",), "nowhere"),
+        ("example_pictures.py", ("tcp://127.0.0.1:9", "overview", "99"), "camera 99 gives no picture"),
+        ("recorded_depth.py", (), "valid: .npz, .pcd, .ply"),
+        ("recorded_depth.py", ("tests/data/wall.xml",), "valid: .npz, .pcd, .ply"),
+        ("realsense_depth.py", (), "No module named 'pyrealsense2'"),
+        ("lerobot_arm.py", (), "No module named 'lerobot'"),
+    ],
+)
+def test_what_is_wrong_ends_an_example_with_one_line_and_exit_code_2(
+    name: str, words: tuple[str, ...], said: str
+) -> None:
+    code, _, complaint = ended(str(EXAMPLES / name), *words, OPENCV_LOG_LEVEL="OFF")
+    assert code == 2
+    assert said in complaint
+    assert complaint.count("\n") == 1
