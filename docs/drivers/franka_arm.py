@@ -9,9 +9,13 @@ import sys
 import threading
 import time
 
-import franky
-import msgpack
-import zmq
+try:
+    import franky
+    import msgpack
+    import zmq
+except ImportError as error:
+    print(f"{error}; valid: pip install franky-control pyzmq msgpack", file=sys.stderr)
+    sys.exit(2)
 
 PERIOD_S, WIDEST_M, FASTEST_M_S, GRIP_N = 0.01, 0.08, 0.05, 30.0
 MOST = {"velocity_rad_s": [2.0] * 7, "acceleration_rad_s2": [7.0] * 7, "jerk_rad_s3": [3000.0] * 7, "latency_s": 0.02}
@@ -87,4 +91,7 @@ def main(robot_address: str, address: str = "tcp://127.0.0.1:5601") -> None:
 
 
 if __name__ == "__main__":
+    if len(sys.argv) not in (2, 3):
+        print("valid: franka_arm.py ADDRESS-OF-THE-ROBOT [tcp://127.0.0.1:5601]", file=sys.stderr)
+        sys.exit(2)
     main(*sys.argv[1:])

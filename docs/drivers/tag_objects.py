@@ -14,17 +14,22 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Annotated, Any
 
-import cv2
-import numpy as np
-import zmq
-from msgspec import Meta, Struct, convert, msgpack
-from scipy.spatial.transform import Rotation
+try:
+    import cv2
+    import numpy as np
+    import zmq
+    from msgspec import Meta, Struct, convert, msgpack
+    from scipy.spatial.transform import Rotation
+except ImportError as error:
+    print(f"{error}; valid: pip install opencv-python-headless scipy pyzmq msgspec", file=sys.stderr)
+    sys.exit(2)
 
 SQUARE = np.array([[-0.5, 0.5, 0.0], [0.5, 0.5, 0.0], [0.5, -0.5, 0.0], [-0.5, -0.5, 0.0]])  # corners as detected
 POINTS = np.array([(0, 0, 0), *itertools.product((-1, 1), repeat=3)])  # of a box in half sizes: centre and corners
 DOUBT, APART = 16.0, 5.0  # squared noises by which a pose must fit better than one that is so many deviations away
 UNSEEN_M_S = 0.02  # how fast an object may move while none of its tags is seen
 KINDS = sorted(name for name in dir(cv2.aruco) if name.startswith("DICT_"))
+LENSES = 0, 4, 5, 8, 12, 14  # numbers of values of a lens that OpenCV knows
 
 Positive, Three = Annotated[float, Meta(gt=0.0)], tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]  # w first
@@ -94,6 +99,8 @@ class Tags:
         boxes = self.file.objects
         if len(self.tags) < sum(len(box.tags) for box in boxes) or len({box.name for box in boxes}) < len(boxes):
             raise ValueError("objects: an id of tags or a name is there twice; valid: each once")
+        if len(of.distortion) not in LENSES:
+            raise ValueError(f"camera.distortion has {len(of.distortion)} values; valid: {LENSES}")
         self.kept = dict[str, tuple[dict[str, Any], float]]()
 
     def objects(self, picture: Any, taken_s: float) -> list[dict[str, Any]]:

@@ -217,6 +217,7 @@ def test_what_is_not_seen_stays_for_the_time_of_the_file_less_surely_and_is_gone
     [
         ("keep_s = 0.0", "keep_s =", "Invalid value"),
         ("36h11", "36h12", "dictionary = 'DICT_APRILTAG_36h12'; valid: DICT_4X4_100, "),
+        ("cy = 238.0", "cy = 238.0\ndistortion = [0.1, 0.2]", "camera.distortion has 2 values; valid: (0, 4, 5, "),
         ("fx = 600.0", "", "required field `fx` - at `$.camera`"),
         ("fx = 600.0", "fx = -1.0", "`$.camera.fx`"),
         ("quaternion = [0.4, 0.8, 0.2, 0.4]", "quaternion = [0.0, 0.0, 0.0, 0.0]", "zero norm"),
