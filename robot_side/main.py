@@ -15,7 +15,6 @@ from common.loop.process import Process
 from common.recording.provenance import provenance
 from common.sockets.door.client import Door
 from common.sockets.door.messages import DoorSettings
-from robot_side.commissioning.measuring import measure
 from robot_side.compiled.kernel import late_kernels
 from robot_side.compiled.warm_up import COMPILING, kernel_digests, kernels_compiled, warm_up
 from robot_side.core.robot_parts import RobotParts
@@ -64,6 +63,9 @@ def command(arguments: Sequence[str], adapt: Callable[[RobotParts], Adapted] = a
     arguments = with_value("--measure-limits", "ask", arguments)
     settings = parse_settings(RobotSettings, "feelahead-robot", arguments)
     if settings.measure_limits is not None:
+        # Its fits would make each start a sixth longer.
+        from robot_side.commissioning.measuring import measure  # noqa: PLC0415
+
         return measure(settings)
     ports = DoorSettings(
         settings.bind,
