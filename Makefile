@@ -13,7 +13,7 @@ export PYTHONDONTWRITEBYTECODE :=
 
 # A file that is only half made is made again.
 .DELETE_ON_ERROR:
-.PHONY: audit figures demo mutants sbom test quick types test-kernel test-arms arms-table test-two-hosts wide-area test-containers test-console test-lerobot test-quiet soak paper pictures notebook driving latency-experiment lock clean
+.PHONY: audit elsewhere figures demo mutants sbom test quick types test-kernel test-arms arms-table test-two-hosts wide-area test-containers test-console test-lerobot test-quiet soak paper pictures notebook driving latency-experiment lock clean
 
 PIP = $(BIN)/python -m pip install --disable-pip-version-check
 PIP_LOG = $(VENV)/pip.log
@@ -208,6 +208,12 @@ LOCKS ?= requirements.lock
 audit: $(VENV)/.tools ## are there known vulnerabilities in what the lock installs?
 	@$(TOOLS)/pip-audit --strict --disable-pip --require-hashes --progress-spinner off $(foreach lock,$(LOCKS),-r $(lock)) $(ARGS) \
 	2> $(VENV)/audit.log || { echo "audit: $$(tail -n 1 $(VENV)/audit.log)"; exit 1; }
+
+# Resolved only: nothing is installed or run.
+OTHER ?= --platform manylinux_2_28_aarch64 --platform manylinux2014_aarch64 --python-version 3.11
+elsewhere: $(VENV)/.installed ## has each locked package a wheel for another machine? unless told, for a Raspberry Pi 5
+	for lock in requirements.lock docker/robot.lock docker/operator.lock; do $(PIP) --quiet --dry-run --ignore-installed \
+	--target $(VENV)/elsewhere $(OTHER) --only-binary=:all: --no-deps --require-hashes -r $$lock || exit 1; done
 
 clean:
 	rm -rf $(VENV) .mypy_cache .ruff_cache .pytest_cache .hypothesis
