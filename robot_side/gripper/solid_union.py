@@ -34,7 +34,7 @@ class SolidUnion:
 
     def depth_m(self, points_m: FloatArray) -> FloatArray:
         """Return (n,): the greatest depth of each point (n, 3) in any of the solids."""
-        depths: FloatArray = np.max([self._depth_m(solid, points_m) for solid in self._solids], axis=0)
+        depths: FloatArray = np.array([self._depth_m(solid, points_m) for solid in self._solids]).max(axis=0)
         return depths
 
     def _depth_m(self, solid: Solid, points_m: FloatArray) -> FloatArray:

@@ -156,7 +156,7 @@ def _alike(union: SolidUnion, centers_m: FloatArray, origin_m: FloatArray, image
 
     With that depth, no image protrudes by more than another.
     """
-    depths = np.min([union.room_m((centers_m - origin_m) @ image.T + origin_m) for image in images], axis=0)
+    depths = np.array([union.room_m((centers_m - origin_m) @ image.T + origin_m) for image in images]).min(axis=0)
     inside = np.isfinite(depths)
     return centers_m[inside], depths[inside]
 

@@ -157,7 +157,7 @@ def _measured(same: _Same) -> GripperTravel | None:
     told, weighed = np.linspace(0.0, most, _WEIGHED), [np.zeros(len(closures))]
     for weight in space.weights(gap.closing):
         rests = [space.rest(sweep, told, way) for way in (weight, -weight)]
-        weighed.append(np.max([sags(one, told, references, closures, openings_m) for one in rests], axis=0))
+        weighed.append(np.array([sags(one, told, references, closures, openings_m) for one in rests]).max(axis=0))
     # However the hand is turned.
     alone = np.maximum(alone, np.linalg.norm(weighed, axis=0))
     return GripperTravel(
