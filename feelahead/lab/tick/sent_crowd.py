@@ -22,7 +22,7 @@ class SentCamera:
         """again: whether frames follow the first."""
         self._again, self._sequence, self._next_s, self._now_s = again, 0, -1.0, 0.0
         seen = crowd(count, 0.0)
-        balls = zip(seen.sphere_object.tolist(), seen.sphere_centers_m, seen.sphere_radii_m, strict=True)
+        balls = zip(seen.sphere_object.tolist(), seen.sphere_centers_m, seen.sphere_radii_m.tolist(), strict=True)
         boxes = zip(seen.box_object.tolist(), seen.box_centers_m, seen.box_half_sizes_m, strict=True)
         corners = zip(seen.tetrahedron_object.tolist(), seen.tetrahedron_vertices_m, strict=True)
         things = [{"name": f"crowd {k}", "position_m": at.tolist(), "sphere": radius} for k, at, radius in balls]

@@ -6,9 +6,11 @@ import pytest
 from common.roles import Role
 from feelahead.lab.questions.tick import Case, rows, run
 from feelahead.lab.tick.crowd import MIDDLE_M, NEAREST_M, CrowdedCamera, crowd
+from feelahead.lab.tick.sent_crowd import SentCamera
 from feelahead.lab.tick.timed_robot import COLUMNS
 from robot_side.drivers.mujoco.camera import MujocoCamera
 from robot_side.drivers.mujoco.scene import load_scene
+from robot_side.surroundings.surroundings import Surroundings
 from robot_side.surroundings.validity import require_valid
 
 
@@ -21,6 +23,15 @@ def test_a_crowd_is_valid_and_out_of_the_way() -> None:
     corners = frame.tetrahedron_vertices_m.mean(axis=1)
     for centers_m in (frame.sphere_centers_m, frame.box_centers_m, corners):
         assert np.linalg.norm(centers_m - MIDDLE_M, axis=1).min() >= NEAREST_M - 1e-9
+
+
+@pytest.mark.parametrize("again", [False, True])
+def test_a_crowd_that_is_sent_is_perceived_whole_and_anew_if_it_comes_again(again: bool) -> None:
+    camera = SentCamera(30, Surroundings(), again=again)
+    frames = [camera.perceive(0.05 * step) for step in range(1, 9)]
+    assert set(frames[0].names) == {f"crowd {k}" for k in range(30)}
+    assert frames[0].sphere_radii_m == pytest.approx(crowd(30, 0.0).sphere_radii_m)
+    assert len({frame.time_s for frame in frames}) == (5 if again else 1)
 
 
 def test_of_a_crowd_around_a_cameras_objects_a_frame_says_what_moves() -> None:
