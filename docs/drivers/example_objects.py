@@ -24,21 +24,15 @@ def main(address: str = "tcp://127.0.0.1:5602") -> None:
         table = {"name": "table", "half_space": True}
         target = {"name": "target", "box": [0.02, 0.02, 0.05], "position_m": [0.6, 0.0, 0.05], "sd_m": 0.003}
         ball = {"name": "ball", "sphere": 0.03, "position_m": [0.5, side_m, 0.2], "velocity_m_s": [0.0, speed_m_s, 0.0]}
-        frame = {
-            "version": 1,
-            "sequence": sequence,
-            "sent_s": now_s,
-            "taken_s": now_s,
-            "objects": [table, target, ball],
-        }
         echo_s, read_s = echo
+        frame = {"version": 1, "sequence": sequence, "sent_s": now_s, "taken_s": now_s}
         frame |= {"echo_s": echo_s, "held_s": 0.0 if echo_s is None else now_s - read_s}
+        frame |= {"objects": [table, target, ball]}
         with contextlib.suppress(zmq.Again):  # no robot side yet
             socket.send(msgpack.packb(frame), zmq.NOBLOCK)
         next_s = max(next_s + 1 / 30, now_s)
-        while socket.poll(
-            1e3 * max(next_s - time.monotonic(), 0.0)
-        ):  # an answer's time of reading bounds the frames' age
+        # An answer's time of reading bounds the frames' age.
+        while socket.poll(1e3 * max(next_s - time.monotonic(), 0.0)):
             answer, read_s = msgpack.unpackb(socket.recv()), time.monotonic()
             if "refused" in answer:
                 print("refused:", answer["refused"], flush=True)

@@ -12,9 +12,13 @@ import contextlib
 import sys
 import time
 
-import cv2
-import msgpack
-import zmq
+try:
+    import cv2
+    import msgpack
+    import zmq
+except ImportError as error:
+    print(f"{error}; valid: pip install opencv-python pyzmq msgpack", file=sys.stderr)
+    sys.exit(2)
 
 DELAY_S = 0.05  # from exposure to the end of `read`: measure it, say by pictures of a running clock
 
@@ -24,10 +28,8 @@ def main(address: str = "tcp://127.0.0.1:5603", view: str = "first_person", numb
     socket = zmq.Context().socket(zmq.DEALER)
     socket.sndhwm, socket.linger = 2, 0
     socket.connect(address)
-    camera, pinhole = (
-        cv2.VideoCapture(int(number)),
-        {},
-    )  # for the overlay, "intrinsics" as cv2.calibrateCamera finds them
+    camera = cv2.VideoCapture(int(number))
+    pinhole = {}  # for the overlay, "intrinsics" as cv2.calibrateCamera finds them
     message = {"version": 1, "sequence": 0, "view": view, "format": "jpeg", "echo_s": None} | pinhole
     read_s = 0.0
     while True:

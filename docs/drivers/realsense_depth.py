@@ -33,14 +33,8 @@ def main(address: str = "tcp://127.0.0.1:5604", name: str = "wrist", serial: str
     config.enable_stream(rs.stream.depth, 640, 480, rs.format.z16, 30)
     profile = pipeline.start(config)
     of = profile.get_stream(rs.stream.depth).as_video_stream_profile().get_intrinsics()
-    message = {
-        "version": 1,
-        "sequence": 0,
-        "camera": name,
-        "width": of.width,
-        "height": of.height,
-        "echo_s": None,
-    } | MOUNT
+    message = {"version": 1, "sequence": 0, "camera": name, "echo_s": None} | MOUNT
+    message |= {"width": of.width, "height": of.height}
     message["depth_unit_m"] = profile.get_device().first_depth_sensor().get_depth_scale()
     # RealSense counts from the centre of the upper left pixel, the robot side from its corner.
     message["intrinsics"] = {"fx": of.fx, "fy": of.fy, "cx": of.ppx + 0.5, "cy": of.ppy + 0.5}

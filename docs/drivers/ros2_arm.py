@@ -9,15 +9,19 @@ import math
 import sys
 import time
 
-import msgpack
-import rclpy
-import zmq
-from builtin_interfaces.msg import Duration
-from rclpy.node import Node
-from rclpy.qos import qos_profile_sensor_data
-from sensor_msgs.msg import JointState
-from std_msgs.msg import Float64MultiArray
-from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+try:
+    import msgpack
+    import rclpy
+    import zmq
+    from builtin_interfaces.msg import Duration
+    from rclpy.node import Node
+    from rclpy.qos import qos_profile_sensor_data
+    from sensor_msgs.msg import JointState
+    from std_msgs.msg import Float64MultiArray
+    from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+except ImportError as error:
+    print(f"{error}; valid: a sourced ROS 2 with pyzmq and msgpack", file=sys.stderr)
+    sys.exit(2)
 
 PERIOD_S, LEAD_RAD, SILENT_S, DOUBT_S, AHEAD_NS, DRIFT_S = 0.01, 0.1, 0.1, 1.0, 50_000_000, 1e-5
 KINDS = {"positions": Float64MultiArray, "trajectory": JointTrajectory}

@@ -81,5 +81,5 @@ if __name__ == "__main__":
     try:
         main(*sys.argv[1:])
     except (OSError, ValueError) as error:
-        print(f"compose: {error}", file=sys.stderr)
+        print("compose:", *str(error).split(), file=sys.stderr)
         sys.exit(2)

@@ -75,6 +75,7 @@ def test_the_open_linkage_of_a_2f85_is_pinned(
         (("left_hand",), "the arm has no body 'left_hand'; valid: world, right_hand"),
         (("--pin=a,b,0,0",), "--pin=a,b,0,0; valid: --pin=LINK,LINK,X,Y,Z"),
         (("right_hand", "north"), "'north'"),
+        (("--pin=a,b,0,0,0",), "'g_a' not found"),
     ],
 )
 def test_wrong_words_end_with_one_line(

@@ -144,6 +144,7 @@ def test_the_example_in_cpp_packs_what_the_robot_side_reads(tmp_path: Path) -> N
         ("realsense_depth.py", (), "No module named 'pyrealsense2'"),
         ("lerobot_arm.py", (), "No module named 'lerobot'"),
         ("franka_arm.py", (), "No module named 'franky'"),
+        ("ros2_arm.py", (), "No module named 'rclpy'"),
     ],
 )
 def test_what_is_wrong_ends_an_example_with_one_line_and_exit_code_2(
