@@ -209,7 +209,7 @@ audit: $(VENV)/.tools ## are there known vulnerabilities in what the lock instal
 	@$(TOOLS)/pip-audit --strict --disable-pip --require-hashes --progress-spinner off $(foreach lock,$(LOCKS),-r $(lock)) $(ARGS) \
 	2> $(VENV)/audit.log || { echo "audit: $$(tail -n 1 $(VENV)/audit.log)"; exit 1; }
 
-# Resolved only: nothing is installed or run.
+# Resolved only: nothing is installed or run. Markers count as for our own Python: for 3.13 it must be 3.13, too.
 OTHER ?= --platform manylinux_2_28_aarch64 --platform manylinux2014_aarch64 --python-version 3.11
 elsewhere: $(VENV)/.installed ## has each locked package a wheel for another machine? unless told, for a Raspberry Pi 5
 	for lock in requirements.lock docker/robot.lock docker/operator.lock; do $(PIP) --quiet --dry-run --ignore-installed \
