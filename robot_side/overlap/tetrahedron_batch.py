@@ -42,6 +42,10 @@ _BOUNDS, _SOLID_VOLUME, _RESULT = found_columns(_INPUTS)
 _SURE = 1.0 + 1e-9
 """Factor on squared lengths by which the bounds allow for rounding"""
 
+_TINY_2 = 1e-150
+"""Square of the radius, divided by that of the farthest corner's distance, up to which a sphere counts as a point:
+products of four such lengths would overflow"""
+
 _ROUNDING_2 = 1e-21
 """(8 · 2⁻⁵³)² / 1e-9: allowance for the rounding error of a product of three lengths, where the factor above does not
 cover it. It is relative to the sixth power of the longest length, as the product is squared."""
@@ -93,7 +97,7 @@ def _bound_by_corners(block: FloatArray, groups: int) -> int:
             _beyond_2(a[0], b[0], c[0], d[0]) + _beyond_2(a[1], b[1], c[1], d[1]) + _beyond_2(a[2], b[2], c[2], d[2])
         )
         farthest_2 = max(dot(a, a), dot(b, b), dot(c, c), dot(d, d))
-        away = (beyond_2 >= radius_2 * _SURE) | (radius == 0.0)
+        away = (beyond_2 >= radius_2 * _SURE) | (radius_2 <= _TINY_2 * farthest_2)
         verdict = WHOLE_SOLID if farthest_2 * _SURE <= radius_2 else PARTIAL
         verdict = NOTHING if away else verdict
         farthest = reach(center) + reach(first) + reach(second) + reach(third) + reach(fourth) + radius

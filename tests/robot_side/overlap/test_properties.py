@@ -117,6 +117,19 @@ def test_powers_of_two_scale_exactly(
         assert scaled == np.float64(factor**3) * plain or plain < 1e-200
 
 
+@repeatable
+@given(corners, st.floats(-320.0, 0.0), st.floats(0.0, 3.0), seeds)
+def test_a_sphere_however_small_shares_a_finite_volume(
+    vertices: FloatArray, magnitude: float, away: float, seed: int
+) -> None:
+    radius = 10.0**magnitude
+    center = vertices[0] + away * radius * rotation(seed)[0]
+    volume, gradient, area = sphere_tetrahedron(center, radius, vertices, gradient=True)
+    assert 0.0 <= volume <= 4.2 * radius**3 or volume < SUBNORMAL
+    assert np.isfinite(gradient).all()
+    assert np.isfinite(area)
+
+
 wild = st.floats(-1e50, 1e50)
 wild_points = arrays.arrays(np.float64, 3, elements=wild)
 
