@@ -139,6 +139,8 @@ figures/approach.csv: asks = try approach --force 2 3 --seeds 2 --law swept pape
 	tests/data/rod_2mm.xml tests/data/rod_5mm.xml tests/data/rod_10mm.xml tests/data/wall_45.xml \
 	--link "delay 0ms" "delay 50ms 10ms distribution normal" \
 	"delay 200ms 10ms distribution normal" "delay 400ms 10ms distribution normal"
+# Two of its runs still creep at the end, as the table says: so it ends with code 1.
+figures/approach.csv: undecided = || test $$? = 1
 figures/depth.csv: asks = bench coverage --quick --perception depth --laws swept --probabilities 0.9 --only bell
 figures/haptics_depth.csv: asks = try haptics --perception depth --scenes wall slot --delays 100 --seeds 10 --arms reacting
 figures/overlap.csv: asks = bench overlap --peer-header overlap.hpp --picture docs/benchmarks/overlap.png
@@ -161,7 +163,7 @@ figures/overlap.csv figures/accuracy.csv: overlap.hpp
 
 $(FIGURES): figures/%.csv: anew
 	$(AS_COMMITTED)
-	$(UNCHANGED) || { $(BIN)/feelahead $(asks) --resume figures/$*-$(COMMIT).jsonl --csv $@ && rm figures/$*-*.jsonl && \
+	$(UNCHANGED) || { { $(BIN)/feelahead $(asks) --resume figures/$*-$(COMMIT).jsonl --csv $@ $(undecided); } && rm figures/$*-*.jsonl && \
 	sed -i 's/^$* .*/$* $(COMMIT)/' figures/commits; }
 
 figures/study.csv: asks = study examples/simulated_study.toml --simulated 12 --out figures/study
