@@ -44,9 +44,10 @@ def main(address: str = "tcp://127.0.0.1:5603", view: str = "first_person", numb
             socket.send(msgpack.packb(message), zmq.NOBLOCK)
         while socket.poll(5):  # an answer that is read at once bounds the pictures' age best
             answer, read_s = msgpack.unpackb(socket.recv()), time.monotonic()
-            print(f"refused: {answer['refused']}", flush=True) if "refused" in answer else message.update(
-                echo_s=answer["sent_s"]
-            )
+            if "refused" in answer:
+                print("refused:", answer["refused"], flush=True)
+            else:
+                message["echo_s"] = answer["sent_s"]
 
 
 if __name__ == "__main__":

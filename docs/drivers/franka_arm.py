@@ -94,4 +94,10 @@ if __name__ == "__main__":
     if len(sys.argv) not in (2, 3):
         print("valid: franka_arm.py ADDRESS-OF-THE-ROBOT [tcp://127.0.0.1:5601]", file=sys.stderr)
         sys.exit(2)
-    main(*sys.argv[1:])
+    try:
+        main(*sys.argv[1:])
+    except KeyboardInterrupt:
+        pass
+    except zmq.ZMQError as error:
+        print(f"{error}; valid: tcp://127.0.0.1:5601", file=sys.stderr)
+        sys.exit(2)

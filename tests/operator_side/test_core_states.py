@@ -209,4 +209,4 @@ def fields_of(command: MotionCommand) -> dict[str, Any]:
 
 
 TestCore = Core.TestCase
-TestCore.settings = settings(max_examples=100, stateful_step_count=50)
+TestCore.settings = settings(max_examples=300, stateful_step_count=50)

@@ -272,5 +272,5 @@ class OperatorMachine(RuleBasedStateMachine):
 
 TestOperators = OperatorMachine.TestCase
 TestOperators.settings = how(
-    derandomize=True, deadline=None, max_examples=50, stateful_step_count=50, phases=(Phase.explicit, Phase.generate)
+    derandomize=True, deadline=None, max_examples=120, stateful_step_count=50, phases=(Phase.explicit, Phase.generate)
 )
